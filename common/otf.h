@@ -1,0 +1,54 @@
+/*
+ * otf.h - transfer functions: sampled OTF of a telescope or of a PSF image, and
+ * the analytic factors of charge diffusion and pixel.
+ *
+ * Frequencies u in cycles/arcsec.  T(u) = integral of PSF(x) exp(-2 pi i u.x),
+ * T(0) = flux of the PSF (1 when normalised).
+ */
+#ifndef PIXSHEAR_OTF_H
+#define PIXSHEAR_OTF_H
+
+#include "err.h"
+#include <stddef.h>
+
+/*
+ * A tabulated transfer function on a square grid of n x n points (n odd), du
+ * apart, centred on u = 0, rows of u_y; re and im as sampled (not spline
+ * coefficients).  Zero outside |u_x|,|u_y| <= ucut.
+ */
+struct otf {
+    int n;
+    double du;
+    double ucut;
+    double *re, *im;       /* n * n, owned; im NULL when T is real */
+    double *sre, *sim;     /* bicubic B-spline coefficients, owned */
+    double chdiff;         /* charge diffusion already inside, arcsec (0: none) */
+    double pixel;          /* square pixel already inside, arcsec (0: none) */
+};
+
+void otf_free(struct otf *t);
+
+/* Take samples (copied), prepare the spline. E_RANGE, E_NOMEM. */
+MUST_CHECK int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re, const double *im);
+
+/*
+ * T on the tensor grid ux[0..nx-1] x uy[0..ny-1]: re[j*nx + i], im likewise.
+ * Bicubic spline in u; zero beyond ucut.
+ */
+MUST_CHECK int otf_grid(const struct otf *t, int nx, const double *ux, int ny, const double *uy,
+                        double *re, double *im);
+
+/*
+ * Exact transform of a sampled PSF (n x n' samples p of scale arcsec, centre at
+ * (cx, cy) counting from 0): T(u) = sum p_j exp(-2 pi i u.x_j) for |u_x|,|u_y| <= ucut,
+ * tensor grid as above, by two small matrix products.
+ */
+MUST_CHECK int otf_from_samples(int nx_p, int ny_p, const double *p, double scale, double cx, double cy,
+                                double ucut, int nx, const double *ux, int ny, const double *uy,
+                                double *re, double *im);
+
+/* exp(-2 pi^2 sigma^2 u^2) and sin(pi u w)/(pi u w): 1-D factors, f[i] *= ... */
+void otf_diffusion(int n, const double *u, double sigma, double *f);
+void otf_box(int n, const double *u, double width, double *f);
+
+#endif

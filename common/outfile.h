@@ -1,0 +1,41 @@
+/*
+ * outfile.h - output that appears whole or not at all.
+ *
+ * A named regular file is written under a temporary name in the same folder
+ * (without a name at all where the system has O_TMPFILE), its size checked,
+ * synced and renamed.  Standard output and devices get their bytes only at
+ * commit, from a spool; a reader that went away or a full device is an error.
+ */
+#ifndef PIXSHEAR_OUTFILE_H
+#define PIXSHEAR_OUTFILE_H
+
+#include "err.h"
+#include <stddef.h>
+#include <stdint.h>
+
+struct outfile;
+
+/*
+ * Open for writing; "-" is standard output.  Refused: a folder, a dangling
+ * link, and a file that is one of the n_inputs inputs by name, link or hard
+ * link.  On failure e tells the cause and *o is NULL.
+ */
+MUST_CHECK int outfile_open(struct outfile **o, const char *name, const char *const *inputs,
+                            size_t n_inputs, struct err *e);
+
+/* Append n bytes, buffered. */
+MUST_CHECK int outfile_write(struct outfile *o, const void *buf, size_t n);
+
+/* Overwrite bytes already appended (FITS headers whose checksums come last). */
+MUST_CHECK int outfile_patch(struct outfile *o, uint64_t offset, const void *buf, size_t n);
+
+/* Bytes appended so far. */
+uint64_t outfile_size(const struct outfile *o);
+
+/* Make the file appear; frees o whatever happens. e tells the cause. */
+MUST_CHECK int outfile_commit(struct outfile *o, struct err *e);
+
+/* Give up: leave nothing behind. o may be NULL. */
+void outfile_abandon(struct outfile *o);
+
+#endif

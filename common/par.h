@@ -1,0 +1,28 @@
+/*
+ * par.h - the only place where threads are made.
+ *
+ * Results never depend on the number of threads: a body writes only what
+ * belongs to its items, and sums that cross items are formed afterwards in
+ * item order.
+ */
+#ifndef PIXSHEAR_PAR_H
+#define PIXSHEAR_PAR_H
+
+#include "err.h"
+
+/*
+ * Work on items begin <= i < end.  `worker` is 0..threads-1 and may index
+ * scratch memory.  Returns OK or a status; after the first failure no new
+ * chunk is started and par_for returns that status (of the lowest item).
+ */
+typedef int par_body(void *ctx, long begin, long end, int worker);
+
+/*
+ * Run body over 0 <= i < n in chunks of `chunk` items (chunk >= 1; boundaries
+ * are multiples of chunk whatever the number of threads) on `threads` threads,
+ * 1..256.  threads == 1 makes no thread.  When the system will not give
+ * threads, the calling thread does the work alone.
+ */
+MUST_CHECK int par_for(long n, long chunk, int threads, par_body *body, void *ctx);
+
+#endif

@@ -1,0 +1,88 @@
+/*
+ * table.h - named columns in memory, with the header a catalogue carries.
+ *
+ * A catalogue is columns (name, unit, description, type), keywords that travel
+ * with the data ("# Keyword: NAME = VALUE"), and HISTORY lines.  The last
+ * column may be ragged: a list of doubles whose length differs from row to row
+ * (COEFFS of a shapelet catalogue).
+ */
+#ifndef PIXSHEAR_TABLE_H
+#define PIXSHEAR_TABLE_H
+
+#include "err.h"
+#include <stddef.h>
+#include <stdint.h>
+
+enum col_type {
+    COL_INT,       /* int64, never missing */
+    COL_REAL,      /* double, printed %.17g shortest form that gives the bits back */
+    COL_REAL32,    /* double in memory, printed %.9g */
+    COL_TEXT,      /* word without blanks */
+    COL_RAGGED     /* doubles to the end of the row; last column only */
+};
+
+struct column {
+    char *name;            /* [A-Z][A-Z0-9_]* */
+    char *unit;            /* "" when dimensionless */
+    char *what;            /* description, at least two words */
+    enum col_type type;
+    union {
+        int64_t *i;
+        double *r;
+        char **s;
+    } v;                   /* nrow values; ragged: v.r holds all rows end to end */
+    size_t *start;         /* ragged: nrow + 1 offsets into v.r */
+};
+
+struct keyword {
+    char *name;
+    char *value;           /* text as in the file */
+};
+
+struct table {
+    size_t nrow, cap;
+    size_t ncol;
+    struct column *col;
+    size_t nkey;
+    struct keyword *key;
+    size_t nhistory;
+    char **history;
+};
+
+void table_free(struct table *t);
+
+/* Add an empty column (nrow zeros / NaN-free zeros / empty words). Names are unique: E_RANGE. */
+MUST_CHECK int table_add(struct table *t, const char *name, enum col_type type, const char *unit,
+                         const char *what);
+
+/* Make nrow rows; new cells are 0, NaN for reals, "" for words. Not for ragged columns' contents. */
+MUST_CHECK int table_resize(struct table *t, size_t nrow);
+
+/* Column by name, NULL when there is none. Case matters. */
+struct column *table_find(const struct table *t, const char *name);
+
+/* Values of a numeric column as doubles: real columns themselves, NULL otherwise. */
+double *table_reals(const struct table *t, const char *name);
+int64_t *table_ints(const struct table *t, const char *name);
+
+/* Number in a cell of an INT or REAL column as double (NaN for text). */
+double table_number(const struct column *c, size_t row);
+
+/* Append a ragged row's n values to column c for row `row` (rows in order). */
+MUST_CHECK int table_ragged(struct table *t, struct column *c, size_t row, const double *v, size_t n);
+
+/* Keep rows with keep[i] != 0, in order. */
+MUST_CHECK int table_keep(struct table *t, const unsigned char *keep);
+
+/* to = deep copy of from. */
+MUST_CHECK int table_copy(struct table *to, const struct table *from);
+
+/* Keywords: text as printed; numbers as few digits as give the bits back. */
+MUST_CHECK int table_set_text(struct table *t, const char *name, const char *value);
+MUST_CHECK int table_set_number(struct table *t, const char *name, double value);
+const char *table_text(const struct table *t, const char *name);          /* NULL: none */
+MUST_CHECK int table_key_number(const struct table *t, const char *name, double *value); /* E_MISSING, E_DATA */
+
+MUST_CHECK int table_history(struct table *t, const char *line);
+
+#endif

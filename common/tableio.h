@@ -1,0 +1,33 @@
+/*
+ * tableio.h - catalogues as text or FITS.  tableio.c is the only file that
+ * parses or prints catalogues.
+ *
+ * Text form (pixshear(7)): four header parts, then one row per line.  On
+ * reading, names come from the last "# NAME NAME ..." line, types and units
+ * from "# Column n: NAME [unit,type] ..." where present.  Without types a
+ * column is INT when every cell is a whole number, REAL when every cell is a
+ * number (nan allowed), else TEXT.  Numbers are read whole or refused: no
+ * trailing characters, overflow, decimal comma, hexadecimal or infinity.  A row has
+ * as many cells as the header names (at least as many with a ragged last
+ * column: name COEFFS).  Lines are at most 64 KiB, 4096 cells; CRLF is read.
+ */
+#ifndef PIXSHEAR_TABLEIO_H
+#define PIXSHEAR_TABLEIO_H
+
+#include "err.h"
+#include "table.h"
+
+/*
+ * Read a catalogue; "-" is standard input; FITS is recognised by its first
+ * bytes.  Errors name file and line: "cat.txt: line 12: ...".
+ */
+MUST_CHECK int table_read(struct table *t, const char *name, double max_memory, struct err *e);
+
+/*
+ * Write; "-" is standard output; a name ending in .fits gives a binary table.
+ * `record` is appended to HISTORY (NULL: none).
+ */
+MUST_CHECK int table_write(const struct table *t, const char *name, const char *record,
+                           const char *const *inputs, size_t n_inputs, struct err *e);
+
+#endif
