@@ -41,7 +41,7 @@ void rng_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4
 /* 64 random bits for (item, index); index < 2^31. */
 uint64_t rng_bits(const struct rng *r, uint64_t item, uint32_t index);
 
-/* Uniform in the open interval (0,1): (k + 1/2) 2^-53, k of 53 bits. */
+/* Uniform in the open interval (0,1): (k + 1/2) 2^-52, k of 52 bits; exact. */
 double rng_uniform(const struct rng *r, uint64_t item, uint32_t index);
 
 /*

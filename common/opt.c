@@ -1,0 +1,588 @@
+/* opt.c - option tables: parsing, --help, the HISTORY record. */
+#include "opt.h"
+#include "err.h"
+#include <ctype.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#ifndef PIXSHEAR_VERSION
+#define PIXSHEAR_VERSION "unknown"
+#endif
+
+/* The options of every program; take_shared() knows where they go. */
+static const struct opt shared_options[] = {
+    {"output", 'o', OPT_STR, 0, 0, 0, "FILE", "output file, - is standard output", 0, 1},
+    {"seed", 's', OPT_LONG, 0, 0, 0, "N", "seed of all random numbers", 0, 0},
+    {"threads", 'j', OPT_LONG, 0, 1, 256, "N", "threads; the result does not depend on it", 0, 0},
+    {"max-memory", 0, OPT_REAL, 0, 1, 1e18, "BYTES", "refuse to use more (K, M, G understood)", 0, 0},
+    {"check", 0, OPT_FLAG, 0, 0, 0, 0, "validate, print plan and cost, do nothing", 0, 0},
+    {"verbose", 'v', OPT_FLAG, 0, 0, 0, 0, "say what is done", 0, 0},
+    {"quiet", 'q', OPT_FLAG, 0, 0, 0, 0, "no warnings, no progress", 0, 0},
+    {"help", 'h', OPT_FLAG, 0, 0, 0, 0, "print this", 0, 0},
+    {"version", 'V', OPT_FLAG, 0, 0, 0, 0, "print the version", 0, 0},
+    {0}
+};
+
+struct parser {
+    const struct program *prog;
+    const struct opt *own;
+    struct common *c;
+    int argc;
+    char **argv;
+};
+
+int opt_number(const char *text, double *value)
+{
+    /* only what a decimal number is made of: no hexadecimal, nan, inf, blanks */
+    if (!*text || text[strspn(text, "0123456789+-.eE")])
+        return -1;
+    char *end;
+    errno = 0;
+    double v = strtod(text, &end);
+    if (*end || end == text || !isfinite(v))
+        return -1;
+    *value = v;
+    return 0;
+}
+
+/* Whole decimal number of 64 bits. */
+static int whole(const char *text, int negative_allowed, int64_t *value)
+{
+    const char *digits = text + (negative_allowed && *text == '-');
+    if (!*digits || digits[strspn(digits, "0123456789")])
+        return -1;
+    errno = 0;
+    long long v = strtoll(text, NULL, 10);
+    if (errno)
+        return -1;
+    *value = v;
+    return 0;
+}
+
+/* Levenshtein distance of short words, for "did you mean". */
+static int distance(const char *a, const char *b)
+{
+    int row[64];
+    int nb = (int)strlen(b);
+    if (nb > 60 || strlen(a) > 60)
+        return 99;
+    for (int j = 0; j <= nb; j++)
+        row[j] = j;
+    for (int i = 1; a[i - 1]; i++) {
+        int diagonal = row[0];
+        row[0] = i;
+        for (int j = 1; j <= nb; j++) {
+            int up = row[j], best = diagonal + (a[i - 1] != b[j - 1]);
+            if (up + 1 < best)
+                best = up + 1;
+            if (row[j - 1] + 1 < best)
+                best = row[j - 1] + 1;
+            diagonal = up;
+            row[j] = best;
+        }
+    }
+    return row[nb];
+}
+
+static const char *nearest(const struct opt *own, const char *name)
+{
+    const char *best = NULL;
+    int least = 4;
+    const struct opt *tables[2] = {own, shared_options};
+    for (int t = 0; t < 2; t++)
+        for (const struct opt *o = tables[t]; o->name; o++) {
+            int d = distance(name, o->name);
+            if (strncmp(name, o->name, strlen(name)) == 0 && d > 2)
+                d = 2;
+            if (d < least) {
+                least = d;
+                best = o->name;
+            }
+        }
+    return best;
+}
+
+_Noreturn static void bad_value(const struct opt *o, const char *text, const char *want)
+{
+    die(EXIT_USAGE, "option --%s: '%s': %s (--help shows all options)", o->name, text, want);
+}
+
+static double ranged(const struct opt *o, const char *whole_text, const char *text)
+{
+    char want[120];
+    double v;
+    if (opt_number(text, &v))
+        bad_value(o, whole_text, "not a number");
+    if (!(v >= o->lo && v <= o->hi)) {
+        snprintf(want, sizeof want, "allowed are %g to %g", o->lo, o->hi);
+        bad_value(o, whole_text, want);
+    }
+    return v;
+}
+
+/* "A,B,..." into at most max numbers; returns their count. */
+static size_t list(const struct opt *o, const char *text, double *v, size_t max)
+{
+    char *copy = strdup(text), *rest = copy;
+    if (!copy)
+        die(EXIT_RUN, "option --%s: %s", o->name, err_text(E_NOMEM));
+    size_t n = 0;
+    for (char *item; (item = strsep(&rest, ",")); n++) {
+        if (n == max)
+            bad_value(o, text, "too many numbers");
+        v[n] = ranged(o, text, item);
+    }
+    free(copy);
+    return n;
+}
+
+static int choice(const struct opt *o, const char *text)
+{
+    char want[160];
+    size_t n = strlen(text);
+    int k = 0;
+    for (const char *p = o->choices; p; k++) {
+        const char *bar = strchr(p, '|');
+        size_t len = bar ? (size_t)(bar - p) : strlen(p);
+        if (n == len && strncmp(p, text, n) == 0)
+            return k;
+        p = bar ? bar + 1 : NULL;
+    }
+    snprintf(want, sizeof want, "use one of %s", o->choices);
+    bad_value(o, text, want);
+}
+
+static void append_string(const struct opt *o, const char *text)
+{
+    struct opt_strs *s = o->value;
+    const char **v = realloc(s->v, (s->n + 1) * sizeof *v);
+    if (!v)
+        die(EXIT_RUN, "option --%s: %s", o->name, err_text(E_NOMEM));
+    s->v = v;
+    v[s->n++] = text;
+}
+
+static void take_reals(const struct opt *o, const char *text)
+{
+    struct opt_reals *r = o->value;
+    size_t max = 1;
+    for (const char *p = text; *p; p++)
+        max += *p == ',';
+    double *v = malloc(max * sizeof *v);
+    if (!v)
+        die(EXIT_RUN, "option --%s: %s", o->name, err_text(E_NOMEM));
+    r->n = list(o, text, v, max);
+    r->v = v;
+}
+
+static void take_long(const struct opt *o, const char *text)
+{
+    char want[120];
+    int64_t v;
+    if (whole(text, 1, &v))
+        bad_value(o, text, "not a whole number");
+    if (!((double)v >= o->lo && (double)v <= o->hi)) {
+        snprintf(want, sizeof want, "allowed are %.0f to %.0f", o->lo, o->hi);
+        bad_value(o, text, want);
+    }
+    *(long *)o->value = (long)v;
+}
+
+static void take(const struct opt *o, const char *text)
+{
+    if (o->type != OPT_FLAG && !*text)
+        bad_value(o, text, "the value is empty");
+    switch (o->type) {
+    case OPT_FLAG: *(int *)o->value = 1; break;
+    case OPT_LONG: take_long(o, text); break;
+    case OPT_REAL: *(double *)o->value = ranged(o, text, text); break;
+    case OPT_STR: *(const char **)o->value = text; break;
+    case OPT_CHOICE: *(int *)o->value = choice(o, text); break;
+    case OPT_REALS: take_reals(o, text); break;
+    case OPT_STRS: append_string(o, text); break;
+    case OPT_PAIR: {
+        double v[2];
+        if (list(o, text, v, 2) != 2)
+            bad_value(o, text, "two numbers with a comma between are needed");
+        memcpy(o->value, v, sizeof v);
+        break;
+    }
+    }
+}
+
+/* Bytes with an optional K, M or G. */
+static double bytes(const struct opt *o, const char *text)
+{
+    char number[64];
+    size_t n = strlen(text);
+    if (n == 0 || n >= sizeof number)
+        bad_value(o, text, "not a number of bytes");
+    const char last = text[n - 1];
+    const double unit = last == 'K' ? 0x1p10 : last == 'M' ? 0x1p20 : last == 'G' ? 0x1p30 : 1;
+    memcpy(number, text, n + 1);
+    if (unit > 1)
+        number[n - 1] = 0;
+    return ranged(o, text, number) * unit;
+}
+
+static void help(const struct parser *p);
+
+static void take_shared(const struct parser *p, const struct opt *o, const char *text)
+{
+    struct common *c = p->c;
+    int64_t v;
+    switch (o->letter ? o->letter : o->name[0]) {
+    case 'o':
+        if (!*text)
+            bad_value(o, text, "the value is empty");
+        c->out = text;
+        break;
+    case 's':
+        if (whole(text, 0, &v))
+            bad_value(o, text, "a whole number from 0 is needed");
+        c->seed = (uint64_t)v;
+        break;
+    case 'j':
+        if (whole(text, 0, &v) || v < 1 || v > 256)
+            bad_value(o, text, "allowed are 1 to 256");
+        c->threads = (int)v;
+        break;
+    case 'm': c->max_memory = bytes(o, text); break;
+    case 'c': c->check = 1; break;
+    case 'v': c->verbose = 1; break;
+    case 'q': c->quiet = 1; break;
+    case 'h': help(p); break;
+    case 'V':
+        printf("%s (pixshear) %s\n", p->prog->name, PIXSHEAR_VERSION);
+        if (fflush(stdout) || ferror(stdout))
+            die(EXIT_RUN, "standard output: %s", strerror(errno));
+        exit(EXIT_DONE);
+    }
+}
+
+static const struct opt *by_name(const struct opt *table, const char *name, size_t n)
+{
+    for (const struct opt *o = table; o->name; o++)
+        if (strlen(o->name) == n && strncmp(o->name, name, n) == 0)
+            return o;
+    return NULL;
+}
+
+static const struct opt *by_letter(const struct opt *table, int letter)
+{
+    for (const struct opt *o = table; o->name; o++)
+        if (o->letter == letter)
+            return o;
+    return NULL;
+}
+
+static void apply(const struct parser *p, const struct opt *o, const char *text)
+{
+    if (o >= shared_options && o < shared_options + sizeof shared_options / sizeof *shared_options) {
+        take_shared(p, o, text);
+        return;
+    }
+    take(o, text);
+    size_t at = (size_t)(o - p->own);
+    if (at < sizeof p->c->given)
+        p->c->given[at] = 1;
+}
+
+/* argv[i] is "--name" or "--name=value"; returns the index of the last word used. */
+static int long_option(const struct parser *p, int i)
+{
+    const char *name = p->argv[i] + 2, *equals = strchr(name, '=');
+    size_t n = equals ? (size_t)(equals - name) : strlen(name);
+    const struct opt *o = by_name(p->own, name, n);
+    if (!o)
+        o = by_name(shared_options, name, n);
+    if (!o) {
+        char word[64];
+        snprintf(word, sizeof word, "%.*s", (int)n, name);
+        const char *near = nearest(p->own, word);
+        if (near)
+            die(EXIT_USAGE, "unknown option --%s: did you mean --%s?", word, near);
+        die(EXIT_USAGE, "unknown option --%s: --help shows all options", word);
+    }
+    if (o->type == OPT_FLAG) {
+        if (equals)
+            bad_value(o, equals + 1, "this option takes no value");
+        apply(p, o, "");
+        return i;
+    }
+    if (equals) {
+        apply(p, o, equals + 1);
+        return i;
+    }
+    if (i + 1 >= p->argc)
+        die(EXIT_USAGE, "option --%s: a value is missing: %s", o->name, o->arg);
+    apply(p, o, p->argv[i + 1]);
+    return i + 1;
+}
+
+/* argv[i] is "-abc" or "-avalue"; returns the index of the last word used. */
+static int short_options(const struct parser *p, int i)
+{
+    for (const char *s = p->argv[i] + 1; *s; s++) {
+        const struct opt *o = by_letter(p->own, *s);
+        if (!o)
+            o = by_letter(shared_options, *s);
+        if (!o)
+            die(EXIT_USAGE, "unknown option -%c: --help shows all options", *s);
+        if (o->type == OPT_FLAG) {
+            apply(p, o, "");
+            continue;
+        }
+        if (s[1]) {
+            apply(p, o, s + 1);
+            return i;
+        }
+        if (i + 1 >= p->argc)
+            die(EXIT_USAGE, "option -%c: a value is missing: %s", *s, o->arg);
+        apply(p, o, p->argv[i + 1]);
+        return i + 1;
+    }
+    return i;
+}
+
+static void print_default(const struct opt *o)
+{
+    switch (o->type) {
+    case OPT_LONG: printf(" [%ld]", *(const long *)o->value); break;
+    case OPT_REAL:
+        if (isfinite(*(const double *)o->value))
+            printf(" [%.10g]", *(const double *)o->value);
+        break;
+    case OPT_PAIR: {
+        const double *v = o->value;
+        if (isfinite(v[0]) && isfinite(v[1]))
+            printf(" [%.10g,%.10g]", v[0], v[1]);
+        break;
+    }
+    case OPT_STR:
+        if (*(const char *const *)o->value)
+            printf(" [%s]", *(const char *const *)o->value);
+        break;
+    case OPT_CHOICE: {
+        const char *p = o->choices;
+        for (int k = *(const int *)o->value; k > 0 && p; k--) {
+            p = strchr(p, '|');
+            p += p != NULL;
+        }
+        if (p && *(const int *)o->value >= 0)
+            printf(" [%.*s]", (int)strcspn(p, "|"), p);
+        break;
+    }
+    case OPT_FLAG: case OPT_REALS: case OPT_STRS: break;
+    }
+}
+
+static void help_line(const struct opt *o)
+{
+    char left[80];
+    const char *arg = o->type == OPT_CHOICE && !o->arg ? o->choices : o->arg;
+    if (o->letter)
+        snprintf(left, sizeof left, "-%c --%s%s%s", o->letter, o->name, arg ? " " : "", arg ? arg : "");
+    else
+        snprintf(left, sizeof left, "   --%s%s%s", o->name, arg ? " " : "", arg ? arg : "");
+    if (strlen(left) > 30)
+        printf("  %s\n  %30s %s", left, "", o->help);
+    else
+        printf("  %-30s %s", left, o->help);
+    if (o->value)
+        print_default(o);
+    putchar('\n');
+}
+
+static void help(const struct parser *p)
+{
+    printf("usage: %s [OPTION]... %s\n%s\n\n", p->prog->name, p->prog->operands, p->prog->what);
+    for (const struct opt *o = p->own; o->name; o++)
+        help_line(o);
+    printf("\n");
+    for (const struct opt *o = shared_options; o->name; o++)
+        help_line(o);
+    if (p->prog->examples)
+        printf("\nexamples:\n%s", p->prog->examples);
+    if (fflush(stdout) || ferror(stdout))
+        die(EXIT_RUN, "standard output: %s", strerror(errno));
+    exit(EXIT_DONE);
+}
+
+/* --completion: one option a line, for the shells' completion and for the man page test. */
+static void completion(const struct parser *p)
+{
+    const struct opt *tables[2] = {p->own, shared_options};
+    for (int t = 0; t < 2; t++)
+        for (const struct opt *o = tables[t]; o->name; o++)
+            printf("--%s%s\t%c\t%s\t%s\n", o->name, o->type == OPT_FLAG ? "" : "=", o->letter ? o->letter : '-',
+                   o->choices ? o->choices : o->in_file ? "FILE" : o->arg ? o->arg : "", t ? "common" : "own");
+    if (fflush(stdout) || ferror(stdout))
+        die(EXIT_RUN, "standard output: %s", strerror(errno));
+    exit(EXIT_DONE);
+}
+
+static double physical_memory(void)
+{
+    long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGESIZE);
+    return pages > 0 && size > 0 ? (double)pages * (double)size : 4e9;
+}
+
+void opt_parse(const struct program *prog, const struct opt *own, struct common *c, int argc, char **argv)
+{
+    struct parser p = {prog, own, c, argc, argv};
+    c->max_memory = physical_memory();
+    c->argv = calloc((size_t)argc + 2, sizeof *c->argv);
+    if (!c->argv)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    int options = 1;
+    for (int i = 1; i < argc; i++) {
+        const char *word = argv[i];
+        if (!options || word[0] != '-' || !word[1])
+            c->argv[c->argc++] = word;
+        else if (strcmp(word, "--") == 0)
+            options = 0;
+        else if (strcmp(word, "--completion") == 0)
+            completion(&p);
+        else
+            i = word[1] == '-' ? long_option(&p, i) : short_options(&p, i);
+    }
+    if (prog->max_operands >= 0 && c->argc > prog->max_operands)
+        die(EXIT_USAGE, "%s: one operand too many: usage: %s [OPTION]... %s", c->argv[prog->max_operands],
+            prog->name, prog->operands);
+    if (c->argc < prog->min_operands)
+        die(EXIT_USAGE, "an operand is missing: usage: %s [OPTION]... %s", prog->name, prog->operands);
+    if (c->argc == 0 && prog->max_operands != 0)
+        c->argv[c->argc++] = "-";
+    int inputs = 0;
+    for (int i = 0; i < c->argc; i++) {
+        if (!*c->argv[i])
+            die(EXIT_USAGE, "operand %d is an empty name", i + 1);
+        inputs += strcmp(c->argv[i], "-") == 0;
+    }
+    if (inputs > 1)
+        die(EXIT_USAGE, "standard input can be read once only");
+    if (inputs == 1 && isatty(STDIN_FILENO))
+        die(EXIT_USAGE, "standard input is a terminal: usage: %s [OPTION]... %s", prog->name, prog->operands);
+}
+
+int opt_given(const struct opt *own, const struct common *c, const char *name)
+{
+    const struct opt *o = by_name(own, name, strlen(name));
+    return o && (size_t)(o - own) < sizeof c->given && c->given[o - own];
+}
+
+/* ---- the HISTORY record ---- */
+
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash && slash[1] ? slash + 1 : path;
+}
+
+static void word_out(FILE *f, const char *text)
+{
+    static const char safe[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%[]";
+    if (*text && !text[strspn(text, safe)]) {
+        fprintf(f, " %s", text);
+        return;
+    }
+    fputs(" '", f);
+    for (; *text; text++) {
+        if (*text == '\'')
+            fputs("'\\''", f);
+        else
+            fputc(isprint((unsigned char)*text) ? *text : '?', f);
+    }
+    fputc('\'', f);
+}
+
+/* A value "TYPE=FILE" keeps TYPE= and the base name. */
+static void file_out(FILE *f, const char *text)
+{
+    const char *equals = strchr(text, '=');
+    if (!equals) {
+        word_out(f, base_name(text));
+        return;
+    }
+    char *joined;
+    if (asprintf(&joined, "%.*s=%s", (int)(equals - text), text, base_name(equals + 1)) < 0)
+        return;
+    word_out(f, joined);
+    free(joined);
+}
+
+static void choice_out(FILE *f, const struct opt *o)
+{
+    const char *p = o->choices;
+    for (int k = *(const int *)o->value; k > 0; k--)
+        p = strchr(p, '|') + 1;
+    fprintf(f, " %.*s", (int)strcspn(p, "|"), p);
+}
+
+static void value_out(FILE *f, const struct opt *o)
+{
+    const double *pair = o->value;
+    const struct opt_reals *r = o->value;
+    switch (o->type) {
+    case OPT_FLAG: break;
+    case OPT_LONG: fprintf(f, " %ld", *(const long *)o->value); break;
+    case OPT_REAL: fprintf(f, " %.15g", *(const double *)o->value); break;
+    case OPT_PAIR: fprintf(f, " %.15g,%.15g", pair[0], pair[1]); break;
+    case OPT_CHOICE: choice_out(f, o); break;
+    case OPT_REALS:
+        for (size_t i = 0; i < r->n; i++)
+            fprintf(f, "%c%.15g", i ? ',' : ' ', r->v[i]);
+        break;
+    case OPT_STR:
+        if (o->in_file)
+            file_out(f, *(const char *const *)o->value);
+        else
+            word_out(f, *(const char *const *)o->value);
+        break;
+    case OPT_STRS: break;
+    }
+}
+
+static void own_options_out(FILE *f, const struct opt *own, const struct common *c)
+{
+    for (const struct opt *o = own; o->name; o++) {
+        if (!opt_given(own, c, o->name))
+            continue;
+        if (o->type != OPT_STRS) {
+            fprintf(f, " --%s", o->name);
+            value_out(f, o);
+            continue;
+        }
+        const struct opt_strs *s = o->value;
+        for (size_t i = 0; i < s->n; i++) {
+            fprintf(f, " --%s", o->name);
+            if (o->in_file)
+                file_out(f, s->v[i]);
+            else
+                word_out(f, s->v[i]);
+        }
+    }
+}
+
+char *opt_record(const struct program *prog, const struct opt *own, const struct common *c)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    if (!f)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    fprintf(f, "%s %s: %s", prog->name, PIXSHEAR_VERSION, prog->name);
+    own_options_out(f, own, c);
+    if (c->seed != 1)
+        fprintf(f, " --seed %llu", (unsigned long long)c->seed);
+    for (int i = 0; i < c->argc; i++)
+        word_out(f, base_name(c->argv[i]));
+    if (fclose(f))
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    return text;
+}
