@@ -12,9 +12,10 @@
 #include <stddef.h>
 
 /*
- * A tabulated transfer function on a square grid of n x n points (n odd), du
- * apart, centred on u = 0, rows of u_y; re and im as sampled (not spline
- * coefficients).  Zero outside |u_x|,|u_y| <= ucut.
+ * A transfer function in one of two forms, zero outside |u_x|,|u_y| <= ucut:
+ * a table on a square grid of n x n points (n odd), du apart, centred on u = 0,
+ * rows of u_y, re and im as sampled (not spline coefficients); or, with n = 0,
+ * the nx_p x ny_p samples p of a PSF, whose transform is evaluated exactly.
  */
 struct otf {
     int n;
@@ -22,6 +23,9 @@ struct otf {
     double ucut;
     double *re, *im;       /* n * n, owned; im NULL when T is real */
     double *sre, *sim;     /* bicubic B-spline coefficients, owned */
+    int nx_p, ny_p;
+    double *p;             /* PSF integrated over scale^2, owned; NULL for a table */
+    double scale, cx, cy;  /* arcsec per sample; position of the origin, counting from 0 */
     double chdiff;         /* charge diffusion already inside, arcsec (0: none) */
     double pixel;          /* square pixel already inside, arcsec (0: none) */
 };
@@ -31,9 +35,18 @@ void otf_free(struct otf *t);
 /* Take samples (copied), prepare the spline. E_RANGE, E_NOMEM. */
 MUST_CHECK int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re, const double *im);
 
+/* Take the samples of a PSF (copied), as in otf_from_samples. E_RANGE, E_NOMEM. */
+MUST_CHECK int otf_sample(struct otf *t, int nx_p, int ny_p, const double *p, double scale, double cx,
+                          double cy, double ucut);
+
+/* 1 when T is real everywhere: im of a table is NULL. */
+int otf_is_real(const struct otf *t);
+
 /*
- * T on the tensor grid ux[0..nx-1] x uy[0..ny-1]: re[j*nx + i], im likewise.
- * Bicubic spline in u; zero beyond ucut.
+ * T on the tensor grid ux[0..nx-1] x uy[0..ny-1]: re[j*nx + i], im likewise (NULL
+ * allowed when T is real).  Table: bicubic spline in u, exact at the nodes.  Samples:
+ * exact; by FFT when both axes are regular (one line of ascending, equally
+ * spaced u), else by matrix products.
  */
 MUST_CHECK int otf_grid(const struct otf *t, int nx, const double *ux, int ny, const double *uy,
                         double *re, double *im);
@@ -41,13 +54,13 @@ MUST_CHECK int otf_grid(const struct otf *t, int nx, const double *ux, int ny, c
 /*
  * Exact transform of a sampled PSF (n x n' samples p of scale arcsec, centre at
  * (cx, cy) counting from 0): T(u) = sum p_j exp(-2 pi i u.x_j) for |u_x|,|u_y| <= ucut,
- * tensor grid as above, by two small matrix products.
+ * tensor grid as above, by two matrix products or, on regular axes, by fft_zoom.
  */
 MUST_CHECK int otf_from_samples(int nx_p, int ny_p, const double *p, double scale, double cx, double cy,
                                 double ucut, int nx, const double *ux, int ny, const double *uy,
                                 double *re, double *im);
 
-/* exp(-2 pi^2 sigma^2 u^2) and sin(pi u w)/(pi u w): 1-D factors, f[i] *= ... */
+/* exp(-2 pi^2 sigma^2 u^2), 1 for sigma = 0, and sin(pi u w)/(pi u w): 1-D factors, f[i] *= ... */
 void otf_diffusion(int n, const double *u, double sigma, double *f);
 void otf_box(int n, const double *u, double width, double *f);
 
