@@ -18,8 +18,9 @@ SHELL       = bash
 .DEFAULT_GOAL := all
 
 LIBS     = cfitsio wcslib gsl fftw3 zlib
-PKG_C   := $(shell pkg-config --cflags $(LIBS) 2>/dev/null)
-PKG_L   := $(shell pkg-config --libs $(LIBS) 2>/dev/null)
+# asked once, when first needed: `make deps all` may have to install pkg-config first
+PKG_C    = $(eval PKG_C := $$(shell pkg-config --cflags $(LIBS) 2>/dev/null))$(PKG_C)
+PKG_L    = $(eval PKG_L := $$(shell pkg-config --libs $(LIBS) 2>/dev/null))$(PKG_L)
 
 # Same bits from every compiler and processor: no contraction, no fast-math.
 ALL_C    = -std=c11 -D_GNU_SOURCE -DPIXSHEAR_VERSION='"$(VERSION)"' -Icommon $(PKG_C) \
@@ -56,8 +57,69 @@ $(BUILD)/flags: FORCE
 	@echo '$(subst ','\'',$(CC) $(ALL_C) $(ALL_L))' | cmp -s - $@ || echo '$(subst ','\'',$(CC) $(ALL_C) $(ALL_L))' > $@
 FORCE:
 .SECONDARY:
+ifneq ($(filter deps,$(MAKECMDGOALS)),)
+$(BUILD)/flags layers: | deps
+endif
 
 -include $(wildcard $(BUILD)/common/*.d $(BUILD)/cmd/*.d $(BUILD)/tests/unit/*.d)
 
 layers:    # check that common/ has an order and that only imageio knows cfitsio
 	@tests/layers
+
+check: all $(UNIT)    # run every test
+	tests/run $(UNIT) $(sort $(wildcard tests/cmd/*.sh tests/peer/*.sh))
+
+check-large: all $(UNIT)    # tests that need time or memory
+	tests/run $(sort $(wildcard tests/large/*.sh))
+
+sanitize:    # the tests again under AddressSanitizer and UndefinedBehaviorSanitizer
+	$(MAKE) check BUILD=build/sanitize BIN=build/sanitize/bin CFLAGS='-O1 -g' \
+	    SAN='-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer'
+
+tsan:    # the tests again under ThreadSanitizer
+	$(MAKE) check BUILD=build/tsan BIN=build/tsan/bin CFLAGS='-O1 -g' SAN='-fsanitize=thread'
+
+coverage:    # lines that the tests reach, one figure a file
+	$(MAKE) check BUILD=build/coverage BIN=build/coverage/bin CFLAGS='-O0 -g --coverage' LDFLAGS=--coverage
+	@tests/coverage build/coverage
+
+lint:    # man pages, shell scripts, compiler warnings as errors with gcc and clang
+	tests/lint
+
+bench: all    # accuracy and time of every program, against its peers where installed
+	tests/bench/run
+
+accuracy: all    # what accuracy costs in time: measured curves, table and figure
+	$(MAKE) -C examples/accuracy
+
+quick: all    # the small experiment: a few minutes, table and figures in examples/pixelscale/quick
+	$(MAKE) -C examples/pixelscale quick $(if $(GALAXIES),GALAXIES=$(abspath $(GALAXIES)))
+
+paper: all    # the whole experiment of High et al. (2007)
+	$(MAKE) -C examples/pixelscale paper $(if $(GALAXIES),GALAXIES=$(abspath $(GALAXIES)))
+
+deps:    # install the compiler, the libraries and the plotter (Debian, Ubuntu)
+	@tests/deps
+
+COMPLETION = $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+
+install: all    # programs, man pages, completion under $(DESTDIR)$(PREFIX)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man7 $(COMPLETION)
+	install $(PROGRAMS:%=$(BIN)/%) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(filter %.1,$(MAN)) $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 $(filter %.7,$(MAN)) $(DESTDIR)$(PREFIX)/share/man/man7
+	for p in $(PROGRAMS); do examples/completion $(BIN)/$$p > $(COMPLETION)/$$p; done
+
+uninstall:    # remove what install put there
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/%) $(PROGRAMS:%=$(COMPLETION)/%)
+	rm -f $(patsubst man/%.1,$(DESTDIR)$(PREFIX)/share/man/man1/%.1,$(filter %.1,$(MAN)))
+	rm -f $(patsubst man/%.7,$(DESTDIR)$(PREFIX)/share/man/man7/%.7,$(filter %.7,$(MAN)))
+
+clean:    # remove everything that was built
+	rm -rf build bin
+	$(MAKE) -s -C examples/pixelscale clean
+
+help:    # this list
+	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
+
+.PHONY: all layers check check-large sanitize tsan coverage lint bench accuracy quick paper deps install uninstall clean help FORCE
