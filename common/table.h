@@ -32,6 +32,7 @@ struct column {
         char **s;
     } v;                   /* nrow values; ragged: v.r holds all rows end to end */
     size_t *start;         /* ragged: nrow + 1 offsets into v.r */
+    size_t room;           /* ragged: values v.r has room for */
 };
 
 struct keyword {
@@ -51,6 +52,9 @@ struct table {
 
 void table_free(struct table *t);
 
+/* 1 when `name` is [A-Z][A-Z0-9_]*. */
+int table_good_name(const char *name);
+
 /* Add an empty column (nrow zeros / NaN-free zeros / empty words). Names are unique: E_RANGE. */
 MUST_CHECK int table_add(struct table *t, const char *name, enum col_type type, const char *unit,
                          const char *what);
@@ -68,13 +72,16 @@ int64_t *table_ints(const struct table *t, const char *name);
 /* Number in a cell of an INT or REAL column as double (NaN for text). */
 double table_number(const struct column *c, size_t row);
 
-/* Append a ragged row's n values to column c for row `row` (rows in order). */
+/* Replace the word in a cell of a TEXT column by a copy of `text`. */
+MUST_CHECK int table_set_word(struct column *c, size_t row, const char *text);
+
+/* Append a ragged row's n values to column c for row `row`: every row once, in order. */
 MUST_CHECK int table_ragged(struct table *t, struct column *c, size_t row, const double *v, size_t n);
 
 /* Keep rows with keep[i] != 0, in order. */
 MUST_CHECK int table_keep(struct table *t, const unsigned char *keep);
 
-/* to = deep copy of from. */
+/* to = deep copy of from; on failure `to` is empty. */
 MUST_CHECK int table_copy(struct table *to, const struct table *from);
 
 /* Keywords: text as printed; numbers as few digits as give the bits back. */
@@ -84,5 +91,25 @@ const char *table_text(const struct table *t, const char *name);          /* NUL
 MUST_CHECK int table_key_number(const struct table *t, const char *name, double *value); /* E_MISSING, E_DATA */
 
 MUST_CHECK int table_history(struct table *t, const char *line);
+
+/*
+ * One whole token as a number, exactly rounded, in any locale: [+-] digits with at most one
+ * point, optional exponent; "nan" as well.  E_DATA when there is anything else (infinity,
+ * hexadecimal, a comma), E_RANGE when it is larger than a double.  `len` bytes, no terminator.
+ */
+MUST_CHECK int table_scan_real(const char *text, size_t len, double *value);
+/* [+-] digits; E_DATA, or E_RANGE beyond int64. */
+MUST_CHECK int table_scan_int(const char *text, size_t len, int64_t *value);
+
+#define TABLE_PRINT 32     /* room for any printed number */
+
+/*
+ * Print x as few digits as give the bits back (at most 17); returns the length, no terminator.
+ * What is not finite is printed as nan.
+ */
+size_t table_print_real(char *to, double x);
+/* Print x with up to 9 significant digits, as %.9g. */
+size_t table_print_real32(char *to, double x);
+size_t table_print_int(char *to, int64_t x);
 
 #endif

@@ -4,10 +4,11 @@
  *
  * Text form (pixshear(7)): four header parts, then one row per line.  On
  * reading, names come from the last "# NAME NAME ..." line, types and units
- * from "# Column n: NAME [unit,type] ..." where present.  Without types a
- * column is INT when every cell is a whole number, REAL when every cell is a
- * number (nan allowed), else TEXT.  Numbers are read whole or refused: no
- * trailing characters, overflow, decimal comma, hexadecimal or infinity.  A row has
+ * from "# Column n: NAME [unit,type] ..." where present; without a line of
+ * names, from "# n NAME description [unit]" (Source Extractor).  Without types
+ * a column is INT when every cell is a whole number, REAL when every cell is a
+ * number (nan allowed), TEXT when none is, and an error when some are.  Numbers are read
+ * whole or refused: no trailing characters, overflow, decimal comma, hexadecimal or infinity.  A row has
  * as many cells as the header names (at least as many with a ragged last
  * column: name COEFFS).  Lines are at most 64 KiB, 4096 cells; CRLF is read.
  */
@@ -25,7 +26,8 @@ MUST_CHECK int table_read(struct table *t, const char *name, double max_memory, 
 
 /*
  * Write; "-" is standard output; a name ending in .fits gives a binary table.
- * `record` is appended to HISTORY (NULL: none).
+ * `record` is appended to HISTORY (NULL: none).  Real cells that are not
+ * finite are printed nan, empty words -.
  */
 MUST_CHECK int table_write(const struct table *t, const char *name, const char *record,
                            const char *const *inputs, size_t n_inputs, struct err *e);

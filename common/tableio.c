@@ -1,0 +1,948 @@
+/*
+ * tableio.c - catalogues as text or FITS, in and out.
+ *
+ * Text is read through one growing buffer, a line at a time, without copying
+ * cells.  When the header gives the type of every column the buffer is reused;
+ * otherwise the rows stay in memory and are read twice, first to find out
+ * which columns are whole numbers, numbers or words.
+ */
+#include "tableio.h"
+#include "imageio.h"
+#include "outfile.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { LINE_MAX_BYTES = 65536, CELLS_MAX = 4096, BLOCK = 1 << 18 };
+enum { UNTYPED = -1 };
+
+/* ---- lines of a file ---- */
+
+struct source {
+    int fd;
+    const char *name;        /* for messages */
+    char *buf;
+    size_t begin, end, cap;  /* unread bytes are buf[begin..end) */
+    size_t keep;             /* bytes from here on stay in the buffer; SIZE_MAX: none */
+    int eof;
+    long line;               /* number of the line returned last */
+    double max_memory;       /* bytes that may be held */
+    double held;             /* bytes held by the table */
+    struct err *e;
+};
+
+static int source_fill(struct source *s)
+{
+    size_t from = s->begin < s->keep ? s->begin : s->keep;
+    if (from) {
+        memmove(s->buf, s->buf + from, s->end - from);
+        s->begin -= from;
+        s->end -= from;
+        s->keep -= s->keep == SIZE_MAX ? 0 : from;
+    }
+    if (s->cap - s->end < BLOCK) {
+        size_t cap = s->cap + s->cap / 2 + 2 * BLOCK;
+        if ((double)cap + s->held > s->max_memory)
+            return err_set(s->e, E_NOMEM, "%s: needs more than --max-memory", s->name);
+        char *b = realloc(s->buf, cap);
+        if (!b)
+            return err_set(s->e, E_NOMEM, "%s: %s", s->name, err_text(E_NOMEM));
+        s->buf = b;
+        s->cap = cap;
+    }
+    ssize_t n;
+    do
+        n = read(s->fd, s->buf + s->end, BLOCK);
+    while (n < 0 && errno == EINTR);
+    if (n < 0)
+        return err_set(s->e, E_IO, "%s: %s", s->name, strerror(errno));
+    s->eof = n == 0;
+    s->end += (size_t)n;
+    return OK;
+}
+
+/* The next line without its end; *line = NULL at the end of the file. */
+static int source_line(struct source *s, char **line, size_t *len)
+{
+    size_t seen = 0;
+    char *nl;
+    while (!(nl = s->end - s->begin > seen ? memchr(s->buf + s->begin + seen, '\n', s->end - s->begin - seen) : NULL)
+           && !s->eof && s->end - s->begin <= LINE_MAX_BYTES) {
+        seen = s->end - s->begin;
+        int st = source_fill(s);
+        if (st)
+            return st;
+    }
+    *line = NULL;
+    *len = (nl ? (size_t)(nl - s->buf) : s->end) - s->begin;
+    if (!nl && *len == 0)
+        return OK;
+    s->line++;
+    if (*len > LINE_MAX_BYTES)
+        return err_set(s->e, E_DATA, "%s: line %ld: longer than %d bytes", s->name, s->line, LINE_MAX_BYTES);
+    *line = s->buf + s->begin;
+    s->begin += *len + (nl != NULL);
+    if (memchr(*line, '\0', *len))
+        return err_set(s->e, E_DATA, "%s: line %ld: a NUL byte: this is not a text catalogue", s->name, s->line);
+    if (*len && (*line)[*len - 1] == '\r')
+        --*len;
+    return OK;
+}
+
+static int is_blank(char c)
+{
+    return c == ' ' || c == '\t';
+}
+
+/* The next word of [*p, end): its length, 0 when there is none; *p moves to its first byte. */
+static size_t next_word(const char **p, const char *end)
+{
+    const char *s = *p;
+    while (s < end && is_blank(*s))
+        s++;
+    *p = s;
+    while (s < end && !is_blank(*s))
+        s++;
+    return (size_t)(s - *p);
+}
+
+/* ---- header ---- */
+
+struct label {               /* what the header says about one column */
+    char *name, *unit, *what;
+    int type;                /* enum col_type or UNTYPED */
+};
+
+struct labels {
+    size_t n;                /* columns named by "# NAME NAME ..." */
+    struct label *col;
+    size_t n_about;          /* columns described by number */
+    struct label *about;     /* index: number - 1 */
+};
+
+static void labels_free(struct labels *h)
+{
+    for (size_t i = 0; i < h->n + h->n_about; i++) {
+        struct label *l = i < h->n ? &h->col[i] : &h->about[i - h->n];
+        free(l->name);
+        free(l->unit);
+        free(l->what);
+    }
+    free(h->col);
+    free(h->about);
+    *h = (struct labels){0};
+}
+
+static int no_memory(struct source *s)
+{
+    return err_set(s->e, E_NOMEM, "%s: line %ld: %s", s->name, s->line, err_text(E_NOMEM));
+}
+
+/* Replace *to by a copy of n bytes without blanks at both ends. */
+static int set_text(struct source *s, char **to, const char *from, size_t n)
+{
+    while (n && is_blank(*from))
+        from++, n--;
+    while (n && is_blank(from[n - 1]))
+        n--;
+    char *c = strndup(from, n);
+    if (!c)
+        return no_memory(s);
+    free(*to);
+    *to = c;
+    return OK;
+}
+
+/* "i64", "f32", "str8" -> column type; -2 when unknown. */
+static int type_from_tag(const char *s, size_t n)
+{
+    static const struct { char tag[4]; int type; } known[] = {
+        {"i8", COL_INT}, {"i16", COL_INT}, {"i32", COL_INT}, {"i64", COL_INT}, {"u8", COL_INT}, {"u16", COL_INT},
+        {"u32", COL_INT}, {"u64", COL_INT}, {"f32", COL_REAL32}, {"f64", COL_REAL}
+    };
+    while (n && is_blank(*s))
+        s++, n--;
+    while (n && is_blank(s[n - 1]))
+        n--;
+    if (n == 0)
+        return UNTYPED;
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (strlen(known[i].tag) == n && memcmp(known[i].tag, s, n) == 0)
+            return known[i].type;
+    int64_t width;
+    return n > 3 && memcmp(s, "str", 3) == 0 && table_scan_int(s + 3, n - 3, &width) == OK ? COL_TEXT : -2;
+}
+
+/* The entry for column `number` among the described ones. */
+static int label_about(struct source *s, struct labels *h, int64_t number, struct label **out)
+{
+    if (number < 1 || number > CELLS_MAX)
+        return err_set(s->e, E_DATA, "%s: line %ld: column number %lld is not in 1..%d", s->name, s->line,
+                       (long long)number, CELLS_MAX);
+    if ((size_t)number > h->n_about) {
+        struct label *a = realloc(h->about, (size_t)number * sizeof *a);
+        if (!a)
+            return no_memory(s);
+        for (h->about = a; h->n_about < (size_t)number; h->n_about++)
+            a[h->n_about] = (struct label){.type = UNTYPED};
+    }
+    *out = &h->about[number - 1];
+    return OK;
+}
+
+static int label_name(struct source *s, struct label *l, const char *name, size_t n, int64_t number)
+{
+    if (l->name && (strlen(l->name) != n || memcmp(l->name, name, n) != 0))
+        return err_set(s->e, E_DATA, "%s: line %ld: column %lld is called %.*s here and %s above", s->name, s->line,
+                       (long long)number, (int)(n < 64 ? n : 64), name, l->name);
+    return set_text(s, &l->name, name, n);
+}
+
+/* After "# Column ": "3: NAME [unit,type] description". */
+static int header_typed(struct source *s, struct labels *h, const char *p, const char *end)
+{
+    size_t n = next_word(&p, end);
+    int64_t number;
+    struct label *l;
+    if (n < 2 || p[n - 1] != ':' || table_scan_int(p, n - 1, &number))
+        return err_set(s->e, E_DATA, "%s: line %ld: '# Column' must be followed by a number and a colon", s->name, s->line);
+    int st = label_about(s, h, number, &l);
+    if (st)
+        return st;
+    p += n;
+    n = next_word(&p, end);
+    if ((st = label_name(s, l, p, n, number)))
+        return st;
+    p += n;
+    next_word(&p, end);
+    if (p < end && *p == '[') {
+        const char *close = memchr(p, ']', (size_t)(end - p));
+        if (!close)
+            return err_set(s->e, E_DATA, "%s: line %ld: a bracket is not closed", s->name, s->line);
+        const char *comma = memchr(p, ',', (size_t)(close - p));
+        if ((st = set_text(s, &l->unit, p + 1, (size_t)((comma ? comma : close) - p - 1))))
+            return st;
+        if (comma) {
+            const char *second = memchr(comma + 1, ',', (size_t)(close - comma - 1));
+            size_t len = (size_t)((second ? second : close) - comma - 1);
+            if ((l->type = type_from_tag(comma + 1, len)) < UNTYPED)
+                return err_set(s->e, E_DATA, "%s: line %ld: type '%.*s' is unknown (i64, f64, f32, str16)", s->name,
+                               s->line, (int)(len < 40 ? len : 40), comma + 1);
+        }
+        p = close + 1;
+    }
+    return set_text(s, &l->what, p, (size_t)(end - p));
+}
+
+/* "3 NAME description [unit]" (Source Extractor's way; ours too). */
+static int header_numbered(struct source *s, struct labels *h, int64_t number, const char *p, const char *end)
+{
+    struct label *l;
+    int st = label_about(s, h, number, &l);
+    size_t n = next_word(&p, end);
+    if (st || n == 0 || (st = label_name(s, l, p, n, number)))
+        return st;
+    p += n;
+    while (end > p && is_blank(end[-1]))
+        end--;
+    if (end > p && end[-1] == ']') {
+        const char *open = end - 1;
+        while (open > p && *open != '[')
+            open--;
+        if (*open == '[') {
+            if ((st = set_text(s, &l->unit, open + 1, (size_t)(end - open - 2))))
+                return st;
+            end = open;
+        }
+    }
+    return l->what && l->what[0] ? OK : set_text(s, &l->what, p, (size_t)(end - p));
+}
+
+/* Are all words of the line column names?  Then they replace the names known so far. */
+static int header_names(struct source *s, struct labels *h, const char *p, const char *end)
+{
+    char name[256];
+    size_t count = 0, n;
+    for (const char *q = p; (n = next_word(&q, end)); q += n, count++) {
+        if (n >= sizeof name)
+            return OK;
+        memcpy(name, q, n);
+        name[n] = '\0';
+        if (!table_good_name(name))
+            return OK;
+    }
+    if (count == 0)
+        return OK;
+    if (count > CELLS_MAX)
+        return err_set(s->e, E_DATA, "%s: line %ld: more than %d columns", s->name, s->line, CELLS_MAX);
+    struct label *l = calloc(count, sizeof *l);
+    if (!l)
+        return no_memory(s);
+    for (size_t i = 0; i < h->n; i++)
+        free(h->col[i].name);
+    free(h->col);
+    h->col = l;
+    h->n = count;
+    int st = OK;
+    for (size_t i = 0; i < count && !st; i++) {
+        n = next_word(&p, end);
+        st = set_text(s, &l[i].name, p, n);
+        p += n;
+    }
+    return st;
+}
+
+/* "NAME = VALUE" of a Keyword line. */
+static int header_keyword(struct source *s, struct table *t, const char *p, const char *end)
+{
+    size_t n = next_word(&p, end);
+    const char *eq = p + n;
+    char *name = NULL, *value = NULL;
+    size_t one = next_word(&eq, end);
+    if (n == 0 || one == 0 || *eq != '=')
+        return err_set(s->e, E_DATA, "%s: line %ld: a Keyword line must be '# Keyword: NAME = VALUE'", s->name, s->line);
+    int st = set_text(s, &name, p, n);
+    if (!st)
+        st = set_text(s, &value, eq + 1, (size_t)(end - eq - 1));
+    if (!st && !table_good_name(name))
+        st = err_set(s->e, E_DATA, "%s: line %ld: keyword '%.64s' is not in capital letters, digits and _", s->name, s->line, name);
+    else if (!st && table_text(t, name))
+        st = err_set(s->e, E_DATA, "%s: line %ld: keyword %s is given twice", s->name, s->line, name);
+    else if (!st && table_set_text(t, name, value))
+        st = no_memory(s);
+    free(name);
+    free(value);
+    return st;
+}
+
+static int starts(const char *p, const char *end, const char *word)
+{
+    size_t n = strlen(word);
+    return (size_t)(end - p) >= n && memcmp(p, word, n) == 0;
+}
+
+/* One line that begins with '#'; p is behind the '#'. */
+static int header_line(struct source *s, struct labels *h, struct table *t, const char *p, const char *end)
+{
+    int64_t number;
+    size_t n = next_word(&p, end);
+    if (n == 0)
+        return OK;
+    if (starts(p, end, "Keyword: "))
+        return header_keyword(s, t, p + 9, end);
+    if (starts(p, end, "HISTORY ")) {
+        char *text = NULL;
+        int st = set_text(s, &text, p + 8, (size_t)(end - p - 8));
+        if (!st && table_history(t, text))
+            st = no_memory(s);
+        free(text);
+        return st;
+    }
+    if (starts(p, end, "Column "))
+        return header_typed(s, h, p + 7, end);
+    if (table_scan_int(p, n, &number) == OK)
+        return header_numbered(s, h, number, p + n, end);
+    return header_names(s, h, p, end);
+}
+
+/* Without a line of names the numbered ones are taken; gaps belong to the column before. */
+static int labels_from_numbers(struct source *s, struct labels *h)
+{
+    if (!h->n_about)
+        return err_set(s->e, E_DATA, "%s: no column names: the header needs a line '# NAME NAME ...' in capital letters", s->name);
+    size_t base = 0;
+    for (size_t i = 0; i < h->n_about; i++) {
+        struct label *l = &h->about[i];
+        char name[300];
+        if (l->name) {
+            if (!table_good_name(l->name))
+                return err_set(s->e, E_DATA, "%s: column %zu: the name '%.64s' is not in capital letters, digits and _",
+                               s->name, i + 1, l->name);
+            base = i;
+            continue;
+        }
+        if (i == 0)
+            return err_set(s->e, E_DATA, "%s: the header does not name column 1", s->name);
+        snprintf(name, sizeof name, "%.250s_%zu", h->about[base].name, i - base);
+        int st = set_text(s, &l->name, name, strlen(name));
+        if (st)
+            return st;
+    }
+    h->col = h->about;
+    h->n = h->n_about;
+    h->about = NULL;
+    h->n_about = 0;
+    return OK;
+}
+
+/* Move what is known by number to the named columns. */
+static int labels_join(struct source *s, struct labels *h)
+{
+    if (h->n == 0)
+        return labels_from_numbers(s, h);
+    if (h->n_about > h->n)
+        return err_set(s->e, E_DATA, "%s: the header describes %zu columns and names %zu", s->name, h->n_about, h->n);
+    for (size_t i = 0; i < h->n; i++)
+        h->col[i].type = UNTYPED;
+    for (size_t i = 0; i < h->n_about; i++) {
+        struct label *a = &h->about[i], *l = &h->col[i];
+        if (!a->name)
+            continue;
+        if (strcmp(a->name, l->name) != 0)
+            return err_set(s->e, E_DATA, "%s: the header calls column %zu both %.64s and %.64s", s->name, i + 1, a->name, l->name);
+        l->unit = a->unit;
+        l->what = a->what;
+        l->type = a->type;
+        a->unit = a->what = NULL;
+    }
+    return OK;
+}
+
+/* ---- rows ---- */
+
+struct rows {
+    struct source *s;
+    struct table *t;
+    double *ragged;          /* cells of one ragged row */
+    size_t ragged_cap;
+};
+
+static int cell_error(struct source *s, const char *column, const char *p, size_t n, const char *what)
+{
+    return err_set(s->e, E_DATA, "%s: line %ld: column %s: '%.*s' %s", s->name, s->line, column,
+                   (int)(n < 60 ? n : 60), p, what);
+}
+
+/* The cell is not a number: say why. */
+static int number_error(struct source *s, const char *column, const char *p, size_t n, int st)
+{
+    return st == E_NOMEM ? no_memory(s)
+         : cell_error(s, column, p, n, st == E_RANGE ? "is too large" : "is not a number");
+}
+
+static int count_error(struct source *s, const struct table *t, size_t got)
+{
+    return err_set(s->e, E_DATA, "%s: line %ld: %zu cells where the header names %zu columns", s->name, s->line, got, t->ncol);
+}
+
+static size_t count_cells(const char *p, const char *end)
+{
+    size_t n, count = 0;
+    for (; (n = next_word(&p, end)); p += n)
+        count++;
+    return count;
+}
+
+/* The cells of a ragged column to the end of the line. */
+static int parse_ragged(struct rows *r, struct column *c, size_t row, const char *p, const char *end)
+{
+    size_t n, count = 0;
+    for (; (n = next_word(&p, end)); p += n) {
+        if (count == r->ragged_cap) {
+            size_t cap = 2 * r->ragged_cap + 64;
+            double *v = realloc(r->ragged, cap * sizeof *v);
+            if (!v)
+                return no_memory(r->s);
+            r->ragged = v;
+            r->ragged_cap = cap;
+        }
+        int st = table_scan_real(p, n, &r->ragged[count++]);
+        if (st)
+            return number_error(r->s, c->name, p, n, st);
+    }
+    if (count + r->t->ncol - 1 > CELLS_MAX)
+        return err_set(r->s->e, E_DATA, "%s: line %ld: more than %d cells", r->s->name, r->s->line, CELLS_MAX);
+    if (count == 0)
+        return count_error(r->s, r->t, r->t->ncol - 1);
+    if (table_ragged(r->t, c, row, r->ragged, count))
+        return no_memory(r->s);
+    r->s->held += 8.0 * (double)count;
+    return OK;
+}
+
+static int parse_word(struct rows *r, struct column *c, size_t row, const char *p, size_t n)
+{
+    char *w = strndup(p, n);
+    if (!w)
+        return no_memory(r->s);
+    free(c->v.s[row]);
+    c->v.s[row] = w;
+    r->s->held += 32.0 + (double)n;
+    return OK;
+}
+
+static int parse_row(struct rows *r, const char *p, const char *end)
+{
+    struct table *t = r->t;
+    size_t row = t->nrow, n, i;
+    const char *line = p;
+    if (row == t->cap) {
+        double more = (double)(t->cap + t->cap / 2) * (double)(t->ncol + 1) * 8;
+        if (more + r->s->held + (double)r->s->cap > r->s->max_memory)
+            return err_set(r->s->e, E_NOMEM, "%s: line %ld: needs more than --max-memory", r->s->name, r->s->line);
+    }
+    if (table_resize(t, row + 1))
+        return no_memory(r->s);
+    for (i = 0; i < t->ncol; i++, p += n) {
+        struct column *c = &t->col[i];
+        if (c->type == COL_RAGGED)
+            return parse_ragged(r, c, row, p, end);
+        if (!(n = next_word(&p, end)))
+            return count_error(r->s, t, i);
+        int st = OK;
+        if (c->type == COL_TEXT)
+            st = parse_word(r, c, row, p, n);
+        else if (c->type != COL_INT)
+            st = table_scan_real(p, n, &c->v.r[row]);
+        else if ((st = table_scan_int(p, n, &c->v.i[row])) == E_DATA)
+            return cell_error(r->s, c->name, p, n, "is not a whole number");
+        if (st)
+            return c->type == COL_TEXT ? st : number_error(r->s, c->name, p, n, st);
+    }
+    if (next_word(&p, end))
+        return count_error(r->s, t, count_cells(line, end));
+    return OK;
+}
+
+/* A comment among the rows: only a second, different header is an error. */
+static int check_comment(struct source *s, const struct table *t, const char *p, const char *end)
+{
+    size_t n = next_word(&p, end), i = 0;
+    int other = 0;
+    if (starts(p, end, "Column ") || starts(p, end, "Keyword: ") || starts(p, end, "HISTORY "))
+        return OK;
+    for (; n && i < t->ncol; i++) {
+        char name[256];
+        if (n >= sizeof name)
+            return OK;
+        memcpy(name, p, n);
+        name[n] = '\0';
+        if (!table_good_name(name))
+            return OK;
+        other |= strcmp(name, t->col[i].name) != 0;
+        p += n;
+        n = next_word(&p, end);
+    }
+    if (n == 0 && i == t->ncol && other)
+        return err_set(s->e, E_DATA, "%s: line %ld: a second header with other columns", s->name, s->line);
+    return OK;
+}
+
+/*
+ * Read rows to the end of the file with what(ctx, begin, end).  `line` is the
+ * first row (NULL: none).
+ */
+typedef int row_fn(void *ctx, const char *p, const char *end);
+
+static int each_row(struct source *s, const struct table *t, char *line, size_t len, row_fn *what, void *ctx)
+{
+    int st = OK;
+    while (line && !st) {
+        const char *p = line, *end = line + len;
+        if (next_word(&p, end))
+            st = *p == '#' ? check_comment(s, t, p + 1, end) : what(ctx, p, end);
+        if (!st)
+            st = source_line(s, &line, &len);
+    }
+    return st;
+}
+
+static int each_parse(void *ctx, const char *p, const char *end)
+{
+    return parse_row(ctx, p, end);
+}
+
+/* ---- types from the cells ---- */
+
+struct guess {
+    struct source *s;
+    const struct labels *h;
+    int ragged;              /* the last column is */
+    struct { long word, number; int real; } *col;   /* first line with a word, with a number */
+    char (*word)[64];        /* that word */
+};
+
+static int each_guess(void *ctx, const char *p, const char *end)
+{
+    struct guess *g = ctx;
+    for (size_t i = 0, n; i < g->h->n - (size_t)g->ragged && (n = next_word(&p, end)); i++, p += n) {
+        double v;
+        int64_t k;
+        if (g->h->col[i].type != UNTYPED)
+            continue;
+        if (table_scan_int(p, n, &k) != E_DATA) {
+            g->col[i].number = g->s->line;
+        } else if (table_scan_real(p, n, &v) != E_DATA) {
+            g->col[i].number = g->s->line;
+            g->col[i].real = 1;
+        } else if (!g->col[i].word) {
+            g->col[i].word = g->s->line;
+            snprintf(g->word[i], sizeof g->word[i], "%.*s", (int)(n < 60 ? n : 60), p);
+        }
+    }
+    return OK;
+}
+
+/* Find the types of untyped columns from all rows; s is left where it was. */
+static int guess_types(struct source *s, struct labels *h, const struct table *t, int ragged, char *line, size_t len)
+{
+    struct guess g = {.s = s, .h = h, .ragged = ragged};
+    g.col = calloc(h->n, sizeof *g.col);
+    g.word = calloc(h->n, sizeof *g.word);
+    size_t offset = (size_t)(line - s->buf), behind = s->begin;
+    long first = s->line;
+    s->keep = offset;
+    int st = g.col && g.word ? each_row(s, t, line, len, each_guess, &g) : no_memory(s);
+    for (size_t i = 0; i < h->n && !st; i++) {
+        if (h->col[i].type != UNTYPED)
+            continue;
+        if (g.col[i].word && g.col[i].number) {
+            s->line = g.col[i].word;
+            st = cell_error(s, h->col[i].name, g.word[i], strlen(g.word[i]), "is not a number");
+        }
+        h->col[i].type = g.col[i].word ? COL_TEXT : g.col[i].real ? COL_REAL : COL_INT;
+    }
+    /* the buffer may have moved its first byte; bytes from keep on are all there */
+    s->begin = s->keep + (behind - offset);
+    s->line = first;
+    free(g.col);
+    free(g.word);
+    return st;
+}
+
+/* ---- reading ---- */
+
+static int add_columns(struct source *s, const struct labels *h, struct table *t, int ragged)
+{
+    for (size_t i = 0; i < h->n; i++) {
+        const struct label *l = &h->col[i];
+        int last = ragged && i + 1 == h->n;
+        if (table_find(t, l->name))
+            return err_set(s->e, E_DATA, "%s: the header names column %s twice", s->name, l->name);
+        int type = last ? COL_RAGGED : l->type == UNTYPED ? COL_REAL : l->type;
+        if (table_add(t, l->name, (enum col_type)type, l->unit, l->what))
+            return err_set(s->e, E_NOMEM, "%s: %s", s->name, err_text(E_NOMEM));
+    }
+    return OK;
+}
+
+/* Header lines up to the first row, which is returned. */
+static int read_header(struct source *s, struct labels *h, struct table *t, char **line, size_t *len)
+{
+    for (;;) {
+        int st = source_line(s, line, len);
+        if (st || !*line)
+            return st;
+        const char *p = *line, *end = *line + *len;
+        if (!next_word(&p, end))
+            continue;
+        if (*p != '#')
+            return OK;
+        if ((st = header_line(s, h, t, p + 1, end)))
+            return st;
+    }
+}
+
+static int read_text(struct source *s, struct table *t)
+{
+    struct labels h = {0};
+    char *line;
+    size_t len;
+    int st = read_header(s, &h, t, &line, &len);
+    if (!st && !line && s->line == 0)
+        st = err_set(s->e, E_DATA, "%s: the file is empty", s->name);
+    if (!st)
+        st = labels_join(s, &h);
+    int ragged = h.n && strcmp(h.col[h.n - 1].name, "COEFFS") == 0, open = 0;
+    for (size_t i = 0; i < h.n; i++)
+        open |= h.col[i].type == UNTYPED && !(ragged && i + 1 == h.n);
+    if (!st && open && line) {
+        struct table names = {0};
+        st = add_columns(s, &h, &names, ragged);
+        if (!st)
+            st = guess_types(s, &h, &names, ragged, line, len);
+        line = st ? NULL : s->buf + s->keep;
+        table_free(&names);
+    }
+    if (!st)
+        st = add_columns(s, &h, t, ragged);
+    struct rows r = {.s = s, .t = t};
+    if (!st)
+        st = each_row(s, t, line, len, each_parse, &r);
+    free(r.ragged);
+    labels_free(&h);
+    return st;
+}
+
+static int read_fits(struct table *t, const char *name, double max_memory, struct err *e)
+{
+    struct fits_in *f;
+    int st = fits_in_open(&f, name, max_memory, e);
+    if (st)
+        return st;
+    st = fits_in_table(f, t, e);
+    fits_in_close(f);
+    return st;
+}
+
+/* Is there no file of this literal name, but "[...]" at its end? */
+static int has_suffix_only(const char *name)
+{
+    size_t n = strlen(name);
+    return n > 2 && name[n - 1] == ']' && strchr(name, '[') && access(name, F_OK) != 0;
+}
+
+int table_read(struct table *t, const char *name, double max_memory, struct err *e)
+{
+    struct table got = {0};
+    int in = strcmp(name, "-") == 0, fits = 0;
+    struct source s = {.fd = 0, .name = in ? "standard input" : name, .keep = SIZE_MAX, .max_memory = max_memory, .e = e};
+    if (name[0] == '\0')
+        return err_set(e, E_MISSING, "an empty file name");
+    if (!in && has_suffix_only(name))
+        return read_fits(t, name, max_memory, e);
+    if (!in && (s.fd = open(name, O_RDONLY | O_CLOEXEC)) < 0)
+        return err_set(e, E_IO, "%s: %s", name, strerror(errno));
+    int st = source_fill(&s);
+    if (!st)
+        fits = s.end >= 2 && (s.buf[0] == 'S' || (s.buf[0] == '\x1f' && s.buf[1] == '\x8b'));
+    if (!st && !fits)
+        st = read_text(&s, &got);
+    if (s.fd > 0)
+        close(s.fd);
+    free(s.buf);
+    if (!st && fits && in && lseek(0, 0, SEEK_SET) != 0)
+        st = err_set(e, E_DATA, "standard input: a FITS table cannot be read from a pipe: give its file name");
+    else if (!st && fits)
+        st = read_fits(&got, name, max_memory, e);
+    if (st)
+        table_free(&got);
+    else
+        *t = got;
+    return st;
+}
+
+/* ---- writing ---- */
+
+struct sink {
+    struct outfile *o;
+    char *buf;
+    size_t n;
+    int st;                  /* first failure */
+};
+
+enum { SINK = 1 << 16 };
+
+static void sink_flush(struct sink *k)
+{
+    if (!k->st)
+        k->st = outfile_write(k->o, k->buf, k->n);
+    k->n = 0;
+}
+
+static void put(struct sink *k, const char *text, size_t n)
+{
+    while (n) {
+        if (k->n == SINK)
+            sink_flush(k);
+        size_t part = n < SINK - k->n ? n : SINK - k->n;
+        memcpy(k->buf + k->n, text, part);
+        k->n += part;
+        text += part;
+        n -= part;
+    }
+}
+
+static void put_text(struct sink *k, const char *text)
+{
+    put(k, text, strlen(text));
+}
+
+/* Text of a header line: control characters would end or hide it. */
+static void put_safe(struct sink *k, const char *text)
+{
+    for (; *text; text++)
+        put(k, (unsigned char)*text < 32 || *text == 127 ? "?" : text, 1);
+}
+
+static void put_padded(struct sink *k, const char *text, size_t width)
+{
+    size_t n = strlen(text);
+    put(k, text, n);
+    for (; n < width; n++)
+        put(k, " ", 1);
+}
+
+/* A number in a cell, printed into the buffer itself. */
+static void put_number(struct sink *k, enum col_type type, const struct column *c, size_t i)
+{
+    if (SINK - k->n < TABLE_PRINT)
+        sink_flush(k);
+    char *to = k->buf + k->n;
+    k->n += type == COL_INT ? table_print_int(to, c->v.i[i])
+          : type == COL_REAL32 ? table_print_real32(to, c->v.r[i]) : table_print_real(to, c->v.r[i]);
+}
+
+static void put_names(struct sink *k, const struct table *t)
+{
+    put_text(k, "#");
+    for (size_t i = 0; i < t->ncol; i++) {
+        put_text(k, " ");
+        put_text(k, t->col[i].name);
+    }
+    put_text(k, "\n");
+}
+
+/* Type as gnuastro spells it; words need their longest length. */
+static void put_type(struct sink *k, const struct column *c, size_t nrow)
+{
+    static const char *const tag[] = {[COL_INT] = "i64", [COL_REAL] = "f64", [COL_REAL32] = "f32", [COL_RAGGED] = "f64"};
+    if (c->type != COL_TEXT) {
+        put_text(k, tag[c->type]);
+        return;
+    }
+    size_t longest = 1;
+    for (size_t i = 0; i < nrow; i++)
+        longest = strlen(c->v.s[i]) > longest ? strlen(c->v.s[i]) : longest;
+    char s[32];
+    snprintf(s, sizeof s, "str%zu", longest);
+    put_text(k, s);
+}
+
+static void put_header(struct sink *k, const struct table *t, const char *record)
+{
+    char s[64];
+    size_t width = 8;
+    for (size_t i = 0; i < t->ncol; i++)
+        width = strlen(t->col[i].name) > width ? strlen(t->col[i].name) : width;
+    put_names(k, t);
+    for (size_t i = 0; i < t->ncol; i++) {
+        const struct column *c = &t->col[i];
+        snprintf(s, sizeof s, "# %3zu ", i + 1);
+        put_text(k, s);
+        put_padded(k, c->name, width + 1);
+        put_safe(k, c->what[0] ? c->what : "no description");
+        if (c->unit[0]) {
+            put_text(k, " [");
+            put_safe(k, c->unit);
+            put_text(k, "]");
+        }
+        put_text(k, "\n");
+    }
+    for (size_t i = 0; i < t->ncol; i++) {
+        const struct column *c = &t->col[i];
+        snprintf(s, sizeof s, "# Column %zu: ", i + 1);
+        put_text(k, s);
+        put_padded(k, c->name, width + 1);
+        put_text(k, "[");
+        put_safe(k, c->unit);
+        put_text(k, ",");
+        put_type(k, c, t->nrow);
+        put_text(k, "] ");
+        put_safe(k, c->what[0] ? c->what : "no description");
+        put_text(k, "\n");
+    }
+    for (size_t i = 0; i < t->nkey; i++) {
+        put_text(k, "# Keyword: ");
+        put_safe(k, t->key[i].name);
+        put_text(k, " = ");
+        put_safe(k, t->key[i].value);
+        put_text(k, "\n");
+    }
+    for (size_t i = 0; i < t->nhistory + (record != NULL); i++) {
+        put_text(k, "# HISTORY ");
+        put_safe(k, i < t->nhistory ? t->history[i] : record);
+        put_text(k, "\n");
+    }
+    put_names(k, t);
+}
+
+/* A word must come back as one cell. */
+static int word_fits(const char *w)
+{
+    return w[0] && !strpbrk(w, " \t\r\n\v\f") && w[0] != '#';
+}
+
+static int put_row(struct sink *k, const struct table *t, size_t row, const char *name, struct err *e)
+{
+    for (size_t i = 0; i < t->ncol; i++) {
+        const struct column *c = &t->col[i];
+        if (i)
+            put(k, " ", 1);
+        if (c->type == COL_RAGGED) {
+            if (c->start[row + 1] <= c->start[row])
+                return err_set(e, E_DATA, "%s: row %zu: column %s has no values", name, row + 1, c->name);
+            for (size_t j = c->start[row]; j < c->start[row + 1]; j++) {
+                if (j > c->start[row])
+                    put(k, " ", 1);
+                put_number(k, COL_REAL, c, j);
+            }
+        } else if (c->type == COL_TEXT) {
+            if (c->v.s[row][0] && !word_fits(c->v.s[row]))
+                return err_set(e, E_DATA, "%s: row %zu: column %s: '%.60s' is not one word: write FITS", name, row + 1,
+                               c->name, c->v.s[row]);
+            put_text(k, c->v.s[row][0] ? c->v.s[row] : "-");
+        } else {
+            put_number(k, c->type, c, row);
+        }
+    }
+    put(k, "\n", 1);
+    return OK;
+}
+
+static int write_text(const struct table *t, const char *name, const char *record, const char *const *inputs,
+                      size_t n_inputs, struct err *e)
+{
+    const char *shown = strcmp(name, "-") == 0 ? "standard output" : name;
+    struct sink k = {.buf = malloc(SINK)};
+    if (!k.buf)
+        return err_set(e, E_NOMEM, "%s: %s", shown, err_text(E_NOMEM));
+    int st = outfile_open(&k.o, name, inputs, n_inputs, e);
+    if (!st) {
+        put_header(&k, t, record);
+        for (size_t i = 0; i < t->nrow && !st && !k.st; i++)
+            st = put_row(&k, t, i, shown, e);
+        sink_flush(&k);
+        if (!st && k.st)
+            st = err_set(e, k.st, "%s: %s", shown, k.st == E_IO ? strerror(errno) : err_text(k.st));
+        if (st)
+            outfile_abandon(k.o);
+        else
+            st = outfile_commit(k.o, e);
+    }
+    free(k.buf);
+    return st;
+}
+
+static int write_fits(const struct table *t, const char *name, const char *record, const char *const *inputs,
+                      size_t n_inputs, struct err *e)
+{
+    struct table copy;
+    struct fits_out *f;
+    if (table_copy(&copy, t) || (record && table_history(&copy, record)))
+        return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
+    int st = fits_out_open(&f, name, inputs, n_inputs, e);
+    if (!st) {
+        st = fits_out_hdu(f, -32, 0, 0, 1, NULL, e);
+        if (!st)
+            st = fits_out_table(f, &copy, "CATALOGUE", e);
+        if (st)
+            fits_out_abandon(f);
+        else
+            st = fits_out_commit(f, e);
+    }
+    table_free(&copy);
+    return st;
+}
+
+int table_write(const struct table *t, const char *name, const char *record, const char *const *inputs,
+                size_t n_inputs, struct err *e)
+{
+    size_t n = strlen(name);
+    if (n > 5 && strcmp(name + n - 5, ".fits") == 0)
+        return write_fits(t, name, record, inputs, n_inputs, e);
+    return write_text(t, name, record, inputs, n_inputs, e);
+}
