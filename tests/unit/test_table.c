@@ -40,7 +40,7 @@ static void test_scan_real(void)
     check_that(bad == 0, "25 chosen numbers are read exactly");
     static const char *const wrong[] = {
         "", "+", "-", ".", "e5", "1e", "1e+", "1.5abc", "1,5", "0x10", "inf", "-inf", "infinity", "1.2.3", "1e5.0", "--1",
-        "1_000", "1d5", "nan(1)", "na", "1 ", "0x1p3", "INF", "1e5e5", "\xef\xbb\xbf" "1", "+-1", "$1", "1f"
+        "1_000", "1d5", "nan(1)", "na", "1 ", "0x1p3", "INF", "1e5e5", ("\xef\xbb\xbf" "1"), "+-1", "$1", "1f"
     };
     bad = 0;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
