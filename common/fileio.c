@@ -1,0 +1,112 @@
+/* fileio.c - descriptors and names. */
+#include "fileio.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* A call larger than this is cut: Linux moves at most 2 GiB - 4 KiB at once. */
+static const size_t most = (size_t)1 << 30;
+
+int file_open(const char *name, int flags, mode_t mode)
+{
+    int fd;
+    do
+        fd = open(name, flags | O_CLOEXEC, mode);
+    while (fd < 0 && errno == EINTR);
+    if (fd < 0 || fd > 2)
+        return fd;
+    int high = fcntl(fd, F_DUPFD_CLOEXEC, 3), why = errno;
+    close(fd);
+    errno = why;
+    return high;
+}
+
+int file_write(int fd, const void *buf, size_t n)
+{
+    const char *p = buf;
+    while (n) {
+        ssize_t k = write(fd, p, n < most ? n : most);
+        if (k < 0 && errno == EINTR)
+            continue;
+        if (k <= 0) {
+            errno = k ? errno : EIO;
+            return -1;
+        }
+        p += k;
+        n -= (size_t)k;
+    }
+    return 0;
+}
+
+int file_pwrite(int fd, const void *buf, size_t n, uint64_t offset)
+{
+    const char *p = buf;
+    while (n) {
+        ssize_t k = pwrite(fd, p, n < most ? n : most, (off_t)offset);
+        if (k < 0 && errno == EINTR)
+            continue;
+        if (k <= 0) {
+            errno = k ? errno : EIO;
+            return -1;
+        }
+        p += k;
+        n -= (size_t)k;
+        offset += (uint64_t)k;
+    }
+    return 0;
+}
+
+ssize_t file_read(int fd, void *buf, size_t n)
+{
+    size_t got = 0;
+    while (got < n) {
+        ssize_t k = read(fd, (char *)buf + got, n - got < most ? n - got : most);
+        if (k < 0 && errno == EINTR)
+            continue;
+        if (k < 0)
+            return -1;
+        if (k == 0)
+            break;
+        got += (size_t)k;
+    }
+    return (ssize_t)got;
+}
+
+ssize_t file_pread(int fd, void *buf, size_t n, uint64_t offset)
+{
+    size_t got = 0;
+    while (got < n) {
+        ssize_t k = pread(fd, (char *)buf + got, n - got < most ? n - got : most,
+                          (off_t)(offset + got));
+        if (k < 0 && errno == EINTR)
+            continue;
+        if (k < 0)
+            return -1;
+        if (k == 0)
+            break;
+        got += (size_t)k;
+    }
+    return (ssize_t)got;
+}
+
+int file_split(const char *name, char **path, char **suffix)
+{
+    struct stat sb;
+    size_t n = strlen(name);
+    const char *open = strrchr(name, '[');
+    int has = n > 2 && name[n - 1] == ']' && open && open > name && lstat(name, &sb) != 0;
+
+    char *p = has ? strndup(name, (size_t)(open - name)) : strdup(name);
+    char *s = has ? strndup(open + 1, n - (size_t)(open - name) - 2) : NULL;
+    if (!p || (has && !s)) {
+        free(p);
+        free(s);
+        return E_NOMEM;
+    }
+    *path = p;
+    *suffix = s;
+    return OK;
+}

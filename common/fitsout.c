@@ -1,0 +1,373 @@
+/*
+ * fitsout.c - FITS files, out.
+ *
+ * An HDU is written card by card and block by block through outfile; its two
+ * checksums (FITS 4.0, section 4.4.2.7 and appendix J) are put into the header
+ * when the data are complete.  No clock, no library, so the same bytes come
+ * out in every run, to a file as to a pipe.
+ */
+#include "fitsout.h"
+#include "fitswalk.h"
+#include "outfile.h"
+#include "simd.h"
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { BLOCK = 128 << 10, CARD = 80, IMAGE_SIDE = 65535 };
+
+struct fits_out {
+    struct outfile *o;
+    char *name;
+    int n;                 /* HDUs begun */
+    char *head;            /* header of the HDU being written, whole blocks */
+    size_t head_size;
+    size_t checksum_at, datasum_at;   /* of the two cards in head */
+    uint64_t head_at;      /* of the header in the file */
+    uint64_t left;         /* bytes of data to come */
+    uint64_t size;         /* bytes of data in all */
+    uint32_t sum;          /* ones' complement sum of the data */
+    unsigned phase;        /* bytes of the data so far, modulo 4 */
+    int bitpix;            /* of an image; 0 in tables */
+    long nx;
+    unsigned char *block;
+};
+
+/* ---- checksums ---- */
+
+static uint32_t fold(uint64_t sum)
+{
+    while (sum >> 32)
+        sum = (sum & 0xffffffffu) + (sum >> 32);
+    return (uint32_t)sum;
+}
+
+/* Ones' complement sum of bytes taken as big-endian words, the first at byte `phase` of a word. */
+static uint32_t add_bytes(uint32_t sum, unsigned phase, const unsigned char *p, size_t n)
+{
+    uint64_t total = sum;
+    for (; n && phase & 3; n--, phase++)
+        total += (uint64_t)*p++ << (24 - 8 * (phase & 3));
+    for (; n >= 4; n -= 4, p += 4)
+        total += (uint64_t)p[0] << 24 | (uint64_t)p[1] << 16 | (uint64_t)p[2] << 8 | p[3];
+    for (unsigned i = 0; i < n; i++)
+        total += (uint64_t)p[i] << (24 - 8 * i);
+    return fold(total);
+}
+
+/* The 16 letters and digits that make the sum of the HDU all ones. */
+static void encode(uint32_t sum, char text[17])
+{
+    uint32_t value = ~sum;
+    char by_byte[16];
+    for (int i = 0; i < 4; i++) {
+        int byte = (int)(value >> (24 - 8 * i) & 0xff);
+        int c[4] = {byte / 4 + byte % 4 + '0', byte / 4 + '0', byte / 4 + '0', byte / 4 + '0'};
+        for (int again = 1; again;) {          /* step round punctuation, in pairs */
+            again = 0;
+            for (int j = 0; j < 4; j += 2)
+                for (int k = j; k < j + 2; k++)
+                    if ((c[k] >= 0x3a && c[k] <= 0x40) || (c[k] >= 0x5b && c[k] <= 0x60)) {
+                        c[j]++;
+                        c[j + 1]--;
+                        again = 1;
+                        break;
+                    }
+        }
+        for (int j = 0; j < 4; j++)
+            by_byte[4 * j + i] = (char)c[j];
+    }
+    for (int i = 0; i < 16; i++)
+        text[i] = by_byte[(i + 15) % 16];
+    text[16] = 0;
+}
+
+static void put_card(char *at, const char *text)
+{
+    size_t n = strnlen(text, CARD);
+    memcpy(at, text, n);
+    memset(at + n, ' ', CARD - n);
+}
+
+/* ---- an HDU as cards and bytes ---- */
+
+static int cannot_write(struct fits_out *f, struct err *e)
+{
+    return err_set(e, E_IO, "%s: cannot write: %s", f->name, strerror(errno));
+}
+
+static int no_memory(struct fits_out *f, struct err *e)
+{
+    return err_set(e, E_NOMEM, "%s: out of memory", f->name);
+}
+
+static int emit(struct fits_out *f, const void *buf, size_t n, struct err *e)
+{
+    int st = outfile_write(f->o, buf, n);
+    return st == E_NOMEM ? no_memory(f, e) : st ? cannot_write(f, e) : OK;
+}
+
+/* Padding and checksums of the HDU before. */
+static int finish(struct fits_out *f, struct err *e)
+{
+    static const unsigned char zeros[FITS_BLOCK];
+    char text[CARD + 1], code[17];
+    if (!f->head)
+        return OK;
+    if (f->left)
+        return err_set(e, E_RANGE, "%s: HDU %d: %llu bytes of data were not written", f->name,
+                       f->n - 1, (unsigned long long)f->left);
+    size_t pad = (size_t)(f->size % FITS_BLOCK);
+    int st = pad ? emit(f, zeros, FITS_BLOCK - pad, e) : OK;
+    if (st)
+        return st;
+
+    snprintf(text, sizeof text, "DATASUM = '%-10u'         / data unit checksum", f->sum);
+    put_card(f->head + f->datasum_at, text);
+    encode(add_bytes(f->sum, 0, (unsigned char *)f->head, f->head_size), code);
+    memcpy(f->head + f->checksum_at + 11, code, 16);
+    if (outfile_patch(f->o, f->head_at, f->head, f->head_size))
+        return cannot_write(f, e);
+    free(f->head);
+    f->head = NULL;
+    return OK;
+}
+
+int fits_out_count(const struct fits_out *f)
+{
+    return f->n;
+}
+
+int fits_out_begin(struct fits_out *f, const struct header *cards, uint64_t data_size, struct err *e)
+{
+    int st = finish(f, e);
+    if (st)
+        return st;
+    size_t n = cards->n + 3;
+    size_t size = (n * CARD + FITS_BLOCK - 1) / FITS_BLOCK * FITS_BLOCK;
+    char *p = f->head = malloc(size);
+    if (!p)
+        return no_memory(f, e);
+    memset(p, ' ', size);
+    for (size_t i = 0; i < cards->n; i++, p += CARD)
+        memcpy(p, cards->card[i], CARD);
+    put_card(p, "CHECKSUM= '0000000000000000'   / HDU checksum");
+    put_card(p + CARD, "DATASUM = '0         '         / data unit checksum");
+    put_card(p + 2 * CARD, "END");
+    f->checksum_at = cards->n * CARD;
+    f->datasum_at = f->checksum_at + CARD;
+    f->head_size = size;
+    f->head_at = outfile_size(f->o);
+    f->left = f->size = data_size;
+    f->sum = 0;
+    f->phase = 0;
+    f->bitpix = 0;
+    f->n++;
+    return emit(f, f->head, size, e);
+}
+
+int fits_out_bytes(struct fits_out *f, const void *buf, size_t n, struct err *e)
+{
+    if (n > f->left)
+        return err_set(e, E_RANGE, "%s: HDU %d: too many bytes of data", f->name, f->n - 1);
+    f->sum = add_bytes(f->sum, f->phase, buf, n);
+    f->phase = (unsigned)((f->phase + n) & 3);
+    f->left -= n;
+    return emit(f, buf, n, e);
+}
+
+/* ---- the file ---- */
+
+int fits_out_open(struct fits_out **out, const char *name, const char *const *inputs,
+                  size_t n_inputs, struct err *e)
+{
+    *out = NULL;
+    if (!strcmp(name, "-") && isatty(STDOUT_FILENO))
+        return err_set(e, E_IO, "standard output: is a terminal: redirect it or give a file name");
+    struct fits_out *f = calloc(1, sizeof *f);
+    if (f) {
+        f->name = strdup(strcmp(name, "-") ? name : "standard output");
+        f->block = malloc(BLOCK);
+    }
+    int st = f && f->name && f->block ? outfile_open(&f->o, name, inputs, n_inputs, e)
+                                      : err_set(e, E_NOMEM, "%s: out of memory", name);
+    if (st)
+        fits_out_abandon(f);
+    else
+        *out = f;
+    return st;
+}
+
+void fits_out_abandon(struct fits_out *f)
+{
+    if (!f)
+        return;
+    outfile_abandon(f->o);
+    free(f->head);
+    free(f->block);
+    free(f->name);
+    free(f);
+}
+
+int fits_out_commit(struct fits_out *f, struct err *e)
+{
+    int st = f->n ? finish(f, e) : err_set(e, E_RANGE, "%s: no HDU was written", f->name);
+    if (st == OK) {
+        st = outfile_commit(f->o, e);
+        f->o = NULL;
+    }
+    fits_out_abandon(f);
+    return st;
+}
+
+/* ---- images ---- */
+
+static int continued(const struct header *h)
+{
+    for (size_t i = 0; i < h->n; i++)
+        if (!memcmp(h->card[i], "CONTINUE", 8))
+            return 1;
+    return 0;
+}
+
+/* Structural cards, then the others of h. */
+static int image_cards(struct header *c, int first, int bitpix, const long *side, int naxis,
+                       const struct header *h)
+{
+    const struct fits_unit image = {.kind = UNIT_IMAGE};
+    int st = first ? header_set_bool(c, "SIMPLE", 1, "conforms to FITS standard")
+                   : header_set_str(c, "XTENSION", "IMAGE", "image extension");
+    if (st == OK)
+        st = header_set_long(c, "BITPIX", bitpix, "type of the pixels");
+    if (st == OK)
+        st = header_set_long(c, "NAXIS", naxis, "number of axes");
+    for (int i = 0; i < naxis && st == OK; i++) {
+        char name[16];
+        snprintf(name, sizeof name, "NAXIS%d", i + 1);
+        st = header_set_long(c, name, side[i], NULL);
+    }
+    if (st == OK && first)
+        st = header_set_bool(c, "EXTEND", 1, NULL);
+    if (st == OK && !first)
+        st = header_set_long(c, "PCOUNT", 0, NULL);
+    if (st == OK && !first)
+        st = header_set_long(c, "GCOUNT", 1, NULL);
+    if (st == OK && h && continued(h))
+        st = header_set_str(c, "LONGSTRN", "OGIP 1.0", "CONTINUE cards may be there");
+    for (size_t i = 0; h && i < h->n && st == OK; i++)
+        if (!fits_structural(h->card[i], &image))
+            st = header_append(c, h->card[i]);
+    return st;
+}
+
+int fits_out_hdu(struct fits_out *f, int bitpix, long nx, long ny, long nz, const struct header *h,
+                 struct err *e)
+{
+    const long side[3] = {nx, ny, nz};
+    if ((bitpix != -32 && bitpix != -64 && bitpix != 32) || nx < 0 || nx > IMAGE_SIDE ||
+        (nx > 0 && (ny < 1 || ny > IMAGE_SIDE || nz < 1 || nz > IMAGE_SIDE)))
+        return err_set(e, E_RANGE, "%s: an image of %ld x %ld x %ld cannot be written", f->name, nx, ny, nz);
+
+    struct header c = {0};
+    uint64_t bytes = (uint64_t)abs(bitpix) / 8;
+    uint64_t size = nx ? (uint64_t)nx * (uint64_t)ny * (uint64_t)nz * bytes : 0;
+    int st = image_cards(&c, f->n == 0, bitpix, side, nx == 0 ? 0 : nz > 1 ? 3 : 2, h);
+    st = st == E_NOMEM ? no_memory(f, e) : st ? err_set(e, st, "%s: %s", f->name, err_text(st))
+                                              : fits_out_begin(f, &c, size, e);
+    header_free(&c);
+    if (st == OK) {
+        f->bitpix = bitpix;
+        f->nx = nx;
+    }
+    return st;
+}
+
+/* To big-endian; returns the sum of the words, below 2^56 for the n <= 2^24 there are in a block. */
+WIDE static uint64_t swap32(unsigned char *restrict out, const void *restrict in, size_t n)
+{
+    uint64_t sum = 0;
+    for (size_t i = 0; i < n; i++) {
+        uint32_t v;
+        memcpy(&v, (const char *)in + 4 * i, 4);
+        sum += v;
+        v = __builtin_bswap32(v);
+        memcpy(out + 4 * i, &v, 4);
+    }
+    return sum;
+}
+
+WIDE static uint64_t swap64(unsigned char *restrict out, const void *restrict in, size_t n)
+{
+    uint64_t sum = 0;
+    for (size_t i = 0; i < n; i++) {
+        uint64_t v;
+        memcpy(&v, (const char *)in + 8 * i, 8);
+        sum += (v & 0xffffffffu) + (v >> 32);
+        v = __builtin_bswap64(v);
+        memcpy(out + 8 * i, &v, 8);
+    }
+    return sum;
+}
+
+static int put_rows(struct fits_out *f, int bitpix, long nrow, const void *pix, struct err *e)
+{
+    size_t bytes = (size_t)abs(bitpix) / 8, n = (size_t)nrow * (size_t)f->nx;
+    if (nrow < 0 || bitpix != f->bitpix || n > f->left / bytes)
+        return err_set(e, E_RANGE, "%s: HDU %d: rows that do not fit the image", f->name, f->n - 1);
+    const char *in = pix;
+    while (n) {
+        size_t k = n < BLOCK / bytes ? n : BLOCK / bytes;
+        uint64_t sum = bytes == 4 ? swap32(f->block, in, k) : swap64(f->block, in, k);
+        f->sum = fold((uint64_t)f->sum + fold(sum));
+        int st = emit(f, f->block, k * bytes, e);
+        if (st)
+            return st;
+        f->left -= k * bytes;
+        in += k * bytes;
+        n -= k;
+    }
+    return OK;
+}
+
+int fits_out_rows(struct fits_out *f, long nrow, const float *pix, struct err *e)
+{
+    return put_rows(f, -32, nrow, pix, e);
+}
+
+int fits_out_rows_double(struct fits_out *f, long nrow, const double *pix, struct err *e)
+{
+    return put_rows(f, -64, nrow, pix, e);
+}
+
+int fits_out_rows_int(struct fits_out *f, long nrow, const int32_t *pix, struct err *e)
+{
+    return put_rows(f, 32, nrow, pix, e);
+}
+
+int image_write(const struct image *im, const char *name, const char *record,
+                const char *const *inputs, size_t n_inputs, struct err *e)
+{
+    struct header h = {0};
+    struct fits_out *f;
+    int st = header_copy(&h, &im->hdr);
+    if (st == OK && record)
+        st = header_history(&h, record);
+    if (st)
+        st = err_set(e, st, "%s: %s", name, err_text(st));
+    else
+        st = fits_out_open(&f, name, inputs, n_inputs, e);
+    if (st) {
+        header_free(&h);
+        return st;
+    }
+    st = fits_out_hdu(f, -32, im->nx, im->ny, 1, &h, e);
+    if (st == OK)
+        st = fits_out_rows(f, im->ny, im->pix, e);
+    header_free(&h);
+    if (st == OK)
+        return fits_out_commit(f, e);
+    fits_out_abandon(f);
+    return st;
+}

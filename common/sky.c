@@ -1,0 +1,249 @@
+/*
+ * sky.c - world coordinates by wcslib (Calabretta & Greisen 2002; SIP and TPV
+ * as wcslib knows them).  The cards of the header are given to wcspih, pixel
+ * coordinates are shifted by one (FITS counts from 1).
+ */
+#include "sky.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <wcslib/dis.h>
+#include <wcslib/wcs.h>
+#include <wcslib/wcserr.h>
+#include <wcslib/wcsfix.h>
+#include <wcslib/wcshdr.h>
+
+enum { PART = 256 };
+
+struct sky {
+    int nwcs;
+    struct wcsprm *all;        /* as wcspih made them */
+    struct wcsprm two;         /* the two celestial axes of the primary one */
+    int has_two;
+    double scale;
+};
+
+void sky_close(struct sky *s)
+{
+    if (!s)
+        return;
+    if (s->has_two)
+        wcsfree(&s->two);
+    if (s->all)
+        wcsvfree(&s->nwcs, &s->all);
+    free(s);
+}
+
+static int wcs_failed(struct err *e, const struct wcsprm *w, const char *what, int code)
+{
+    const char *why = w->err && w->err->msg[0] ? w->err->msg : code > 0 && code < 14 ? wcs_errmsg[code] : "";
+    char line[200];
+    snprintf(line, sizeof line, "%s", why);
+    line[strcspn(line, "\n")] = 0;
+    return err_set(e, code == WCSERR_MEMORY ? E_NOMEM : E_DATA, "%s: %s", what, line);
+}
+
+/* The cards as one string for wcspih; those without a value are not needed. */
+static char *join(const struct header *h, int *n)
+{
+    char *text = malloc(h->n * 80 + 1);
+    if (!text)
+        return NULL;
+    *n = 0;
+    for (size_t i = 0; i < h->n; i++)
+        if (h->card[i][8] == '=')
+            memcpy(text + 80 * (size_t)(*n)++, h->card[i], 80);
+    text[80 * (size_t)*n] = 0;
+    return text;
+}
+
+static int parse(struct sky *s, const struct header *h, struct err *e)
+{
+    int n, rejected;
+    char *text = h->n < 1000000 ? join(h, &n) : NULL;
+    if (!text)
+        return err_set(e, E_NOMEM, "out of memory");
+    int st = n ? wcspih(text, n, WCSHDR_all, 0, &rejected, &s->nwcs, &s->all) : 0;
+    free(text);
+    if (st)
+        return err_set(e, st == 2 ? E_NOMEM : E_DATA, "WCS: cannot be read (wcslib status %d)", st);
+    return OK;
+}
+
+/* Set up the primary WCS and reduce it to its two celestial axes. */
+static int set_up(struct sky *s, struct err *e)
+{
+    int fixed[NWCSFIX], axes[2] = {WCSSUB_LONGITUDE, WCSSUB_LATITUDE}, two = 2;
+    struct wcsprm *w = s->nwcs > 0 ? s->all : NULL;
+    if (!w || w->naxis < 2)
+        return E_MISSING;
+    (void)wcsfix(0, NULL, w, fixed);          /* old spellings; what it cannot mend wcsset refuses */
+    int st = wcsset(w);
+    if (st)
+        return wcs_failed(e, w, "WCS", st);
+    if (w->lng < 0 || w->lat < 0)
+        return E_MISSING;
+    s->two.flag = -1;
+    if (w->naxis == 2) {
+        axes[0] = 1;                          /* keep the order of the pixel axes */
+        axes[1] = 2;
+    }
+    st = wcssub(1, w, &two, axes, &s->two);
+    s->has_two = 1;
+    if (st)
+        return wcs_failed(e, &s->two, "WCS", st);
+    if (two != 2)
+        return E_MISSING;
+    st = wcsset(&s->two);
+    if (st)
+        return wcs_failed(e, &s->two, "WCS", st);
+    const double *pc = s->two.pc, *d = s->two.cdelt;
+    double det = d[0] * d[1] * (pc[0] * pc[3] - pc[1] * pc[2]);
+    s->scale = sqrt(fabs(det)) * 3600;
+    if (!(s->scale > 0) || !isfinite(s->scale))
+        return err_set(e, E_DATA, "WCS: the CD matrix is singular");
+    return OK;
+}
+
+int sky_open(struct sky **out, const struct header *h, struct err *e)
+{
+    *out = NULL;
+    struct sky *s = calloc(1, sizeof *s);
+    if (!s)
+        return err_set(e, E_NOMEM, "out of memory");
+    wcserr_enable(1);
+    int st = parse(s, h, e);
+    if (st == OK)
+        st = set_up(s, e);
+    if (st == E_MISSING) {
+        double scale;
+        if (header_double(h, "PIXSCALE", &scale) == OK)
+            err_set(e, st, "no celestial WCS (CTYPE1, CRVAL1, ...), only PIXSCALE = %g arcsec", scale);
+        else
+            err_set(e, st, "no celestial WCS (CTYPE1, CRVAL1, ...) in the header");
+    }
+    if (st)
+        sky_close(s);
+    else
+        *out = s;
+    return st;
+}
+
+/* One part of at most PART positions, forward (pixel to sky) or back. */
+static int part(struct sky *s, int forward, size_t n, const double *a, const double *b, double *to_a,
+                double *to_b)
+{
+    double in[2 * PART], mid[2 * PART], out[2 * PART], phi[PART], theta[PART];
+    int stat[PART], failures = 0, lng = s->two.lng, lat = s->two.lat;
+    for (size_t i = 0; i < n; i++) {
+        int good = isfinite(a[i]) && isfinite(b[i]);
+        in[2 * i + (forward ? 0 : (size_t)lng)] = !good ? (forward ? s->two.crpix[0] : s->two.crval[lng])
+                                                        : forward ? a[i] + 1 : a[i];
+        in[2 * i + (forward ? 1 : (size_t)lat)] = !good ? (forward ? s->two.crpix[1] : s->two.crval[lat])
+                                                        : forward ? b[i] + 1 : b[i];
+        stat[i] = 0;
+    }
+    int st = forward ? wcsp2s(&s->two, (int)n, 2, in, mid, phi, theta, out, stat)
+                     : wcss2p(&s->two, (int)n, 2, in, phi, theta, mid, out, stat);
+    int all = st && st != WCSERR_BAD_PIX && st != WCSERR_BAD_WORLD;
+    for (size_t i = 0; i < n; i++) {
+        double u = out[2 * i + (forward ? (size_t)lng : 0)] - (forward ? 0 : 1);
+        double v = out[2 * i + (forward ? (size_t)lat : 1)] - (forward ? 0 : 1);
+        int bad = all || stat[i] || !isfinite(a[i]) || !isfinite(b[i]) || !isfinite(u) || !isfinite(v);
+        failures += bad;
+        to_a[i] = bad ? NAN : u;
+        to_b[i] = bad ? NAN : v;
+    }
+    return failures;
+}
+
+static int convert(struct sky *s, int forward, size_t n, const double *a, const double *b, double *to_a,
+                   double *to_b)
+{
+    int failures = 0;
+    for (size_t at = 0; at < n; at += PART) {
+        size_t k = n - at < PART ? n - at : PART;
+        failures |= part(s, forward, k, a + at, b + at, to_a + at, to_b + at) > 0;
+    }
+    return failures ? E_RANGE : OK;
+}
+
+int sky_from_pixel(struct sky *s, size_t n, const double *x, const double *y, double *ra, double *dec)
+{
+    return convert(s, 1, n, x, y, ra, dec);
+}
+
+int sky_to_pixel(struct sky *s, size_t n, const double *ra, const double *dec, double *x, double *y)
+{
+    return convert(s, 0, n, ra, dec, x, y);
+}
+
+int sky_is_linear(const struct sky *s)
+{
+    return !strcmp(s->two.cel.prj.code, "TAN") && !s->two.lin.dispre && !s->two.lin.disseq;
+}
+
+double sky_scale(const struct sky *s)
+{
+    return s->scale;
+}
+
+/* Remove every card that could contradict a new WCS. */
+static void clear(struct header *h)
+{
+    static const char *const plain[] = {
+        "WCSAXES", "WCSNAME", "CTYPE1", "CTYPE2", "CRPIX1", "CRPIX2", "CRVAL1", "CRVAL2", "CDELT1",
+        "CDELT2", "CROTA1", "CROTA2", "CUNIT1", "CUNIT2", "LONPOLE", "LATPOLE", "RADESYS", "RADECSYS",
+        "EQUINOX", "EPOCH", "CPDIS1", "CPDIS2", "CQDIS1", "CQDIS2", "DP1", "DP2", "DQ1", "DQ2",
+        "A_*", "B_*", "AP_*", "BP_*"};
+    static const char *const matrix[] = {"PC%d_%d", "CD%d_%d", "PV%d_%d", "PS%d_%d"};
+    char name[16];
+    for (size_t i = 0; i < sizeof plain / sizeof *plain; i++)
+        header_remove(h, plain[i]);
+    for (size_t m = 0; m < sizeof matrix / sizeof *matrix; m++)
+        for (int i = 1; i <= 2; i++)
+            for (int j = 0; j < (m < 2 ? 3 : 40); j++) {
+                snprintf(name, sizeof name, matrix[m], i, j);
+                header_remove(h, name);
+            }
+}
+
+int sky_set_tan(struct header *h, double scale, double crpix1, double crpix2, double crval1, double crval2)
+{
+    double cd = scale / 3600;
+    if (!(scale > 0) || !isfinite(scale) || !isfinite(crpix1) || !isfinite(crpix2) ||
+        !isfinite(crval1) || !(fabs(crval2) <= 90))
+        return E_RANGE;
+    const struct {
+        const char *name;
+        double value;
+        const char *comment;
+    } number[] = {{"CRPIX1", crpix1, "reference pixel"},        {"CRPIX2", crpix2, "reference pixel"},
+                  {"CRVAL1", crval1, "[deg] right ascension"},  {"CRVAL2", crval2, "[deg] declination"},
+                  {"CD1_1", -cd, "[deg] east is left"},         {"CD1_2", 0, NULL},
+                  {"CD2_1", 0, NULL},                           {"CD2_2", cd, "[deg] north is up"}};
+    struct header new;
+    int st = header_copy(&new, h);
+    if (st)
+        return st;
+    clear(&new);
+    st = header_set_str(&new, "CTYPE1", "RA---TAN", "gnomonic projection");
+    if (st == OK)
+        st = header_set_str(&new, "CTYPE2", "DEC--TAN", "gnomonic projection");
+    if (st == OK)
+        st = header_set_str(&new, "CUNIT1", "deg", NULL);
+    if (st == OK)
+        st = header_set_str(&new, "CUNIT2", "deg", NULL);
+    for (size_t i = 0; i < sizeof number / sizeof *number && st == OK; i++)
+        st = header_set_double(&new, number[i].name, number[i].value, number[i].comment);
+    if (st == OK)
+        st = header_set_str(&new, "RADESYS", "ICRS", NULL);
+    if (st) {
+        header_free(&new);
+        return st;
+    }
+    header_free(h);
+    *h = new;
+    return OK;
+}
