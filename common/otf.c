@@ -61,24 +61,18 @@ static void solve_row(int n, const double *ratio, double *c)
         c[i] -= ratio[i] * c[i + 1];
 }
 
-/* Copy of n x n samples, and their spline coefficients. */
-static int spline(int n, const double *ratio, const double *v, double **copy, double **coef)
+/* Spline coefficients of n x n samples, allocated; NULL without memory. */
+static double *coefficients(int n, const double *ratio, const double *v)
 {
     size_t bytes = (size_t)n * (size_t)n * sizeof *v;
-    double *a = malloc(bytes), *c = malloc(bytes);
-    if (!a || !c) {
-        free(a);
-        free(c);
-        return E_NOMEM;
-    }
-    memcpy(a, v, bytes);
+    double *c = malloc(bytes);
+    if (!c)
+        return NULL;
     memcpy(c, v, bytes);
     for (int i = 0; i < n; i++)
         solve_row(n, ratio, c + (size_t)i * (size_t)n);
     solve_columns(n, ratio, c, (size_t)n);
-    *copy = a;
-    *coef = c;
-    return OK;
+    return c;
 }
 
 static int all_finite(size_t n, const double *v)
@@ -89,7 +83,7 @@ static int all_finite(size_t n, const double *v)
     return sum == 0;
 }
 
-int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re, const double *im)
+int otf_nodes(struct otf *t, int n, double du, double ucut, double *re, double *im)
 {
     if (n < 1 || n > N_MAX || n % 2 == 0 || !(du > 0) || !isfinite(du) || !(ucut > 0) ||
         !isfinite(ucut))
@@ -97,23 +91,59 @@ int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re,
     size_t count = (size_t)n * (size_t)n;
     if (!all_finite(count, re) || (im && !all_finite(count, im)))
         return E_RANGE;
-    struct otf made = {.n = n, .du = du, .ucut = ucut};
-    double *ratio = malloc((size_t)n * sizeof *ratio);
-    if (!ratio)
-        return E_NOMEM;
-    ratio[0] = 0.25;
-    for (int i = 1; i < n; i++)
-        ratio[i] = 1 / (4 - ratio[i - 1]);
-    int status = spline(n, ratio, re, &made.re, &made.sre);
-    if (status == OK && im)
-        status = spline(n, ratio, im, &made.im, &made.sim);
+    *t = (struct otf){.n = n, .du = du, .ucut = ucut, .re = re, .im = im};
+    return OK;
+}
+
+int otf_spline(struct otf *t)
+{
+    int n = t->n;
+    if (n < 1 || t->sre)
+        return n < 1 ? E_RANGE : OK;
+    double *ratio = malloc((size_t)n * sizeof *ratio), *sre = NULL, *sim = NULL;
+    if (ratio) {
+        ratio[0] = 0.25;
+        for (int i = 1; i < n; i++)
+            ratio[i] = 1 / (4 - ratio[i - 1]);
+        sre = coefficients(n, ratio, t->re);
+        sim = t->im ? coefficients(n, ratio, t->im) : NULL;
+    }
     free(ratio);
+    if (!sre || (t->im && !sim)) {
+        free(sre);
+        free(sim);
+        return E_NOMEM;
+    }
+    t->sre = sre;
+    t->sim = sim;
+    return OK;
+}
+
+int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re, const double *im)
+{
+    if (n < 1 || n > N_MAX)
+        return E_RANGE;
+    size_t bytes = (size_t)n * (size_t)n * sizeof *re;
+    double *a = malloc(bytes), *b = im ? malloc(bytes) : NULL;
+    struct otf made = {0};
+    int status = a && (b || !im) ? OK : E_NOMEM;
+    if (status == OK) {
+        memcpy(a, re, bytes);
+        if (b)
+            memcpy(b, im, bytes);
+        status = otf_nodes(&made, n, du, ucut, a, b);
+    }
     if (status) {
-        otf_free(&made);
+        free(a);
+        free(b);
         return status;
     }
-    *t = made;
-    return OK;
+    status = otf_spline(&made);
+    if (status)
+        otf_free(&made);
+    else
+        *t = made;
+    return status;
 }
 
 int otf_sample(struct otf *t, int nx_p, int ny_p, const double *p, double scale, double cx, double cy,

@@ -32,7 +32,15 @@ struct otf {
 
 void otf_free(struct otf *t);
 
-/* Take samples (copied), prepare the spline. E_RANGE, E_NOMEM. */
+/*
+ * Table of n x n samples without a spline: re and im (malloc'ed, im may be NULL) become t's on
+ * success.  Serves the sums of psf.h; otf_grid needs otf_spline first. E_RANGE.
+ */
+MUST_CHECK int otf_nodes(struct otf *t, int n, double du, double ucut, double *re, double *im);
+/* Prepare the spline of such a table. E_NOMEM. */
+MUST_CHECK int otf_spline(struct otf *t);
+
+/* Both, samples copied. E_RANGE, E_NOMEM. */
 MUST_CHECK int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re, const double *im);
 
 /* Take the samples of a PSF (copied), as in otf_from_samples. E_RANGE, E_NOMEM. */

@@ -1,0 +1,382 @@
+/*
+ * psf.c - image, profile, width, encircled energy and weighted moments of a
+ * transfer function, all as sums over its nodes.
+ *
+ * Round averages need T only by |u|: nodes are summed by i^2 + j^2 first, so
+ *   profile(r) = du^2 sum_q S_q J0(2 pi r du sqrt q),
+ *   inside(r)  = du^2 sum_q S_q r J1(2 pi r du sqrt q) / (du sqrt q).
+ */
+#include "psf.h"
+#include "fft.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* T times its factors on a regular grid: n x n (n odd), centred on u = 0. */
+struct nodes {
+    int n;
+    double du;
+    double *re, *im;           /* im NULL when T is real */
+};
+
+static void nodes_free(struct nodes *g)
+{
+    free(g->re);
+    free(g->im);
+}
+
+double psf_period(const struct otf *t)
+{
+    if (t->n)
+        return 1 / t->du;
+    return 2 * t->scale * (t->nx_p > t->ny_p ? t->nx_p : t->ny_p);
+}
+
+/* Multiply by the two factors and cut at t->ucut. */
+static void apply_factors(const struct otf *t, double diffusion, double pixel, const double *u, double *f,
+                          struct nodes *g)
+{
+    int n = g->n;
+    for (int i = 0; i < n; i++)
+        f[i] = fabs(u[i]) <= t->ucut * (1 + 1e-12);
+    otf_diffusion(n, u, diffusion, f);
+    if (pixel > 0)
+        otf_box(n, u, pixel, f);
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++) {
+            size_t at = (size_t)j * (size_t)n + (size_t)i;
+            g->re[at] *= f[j] * f[i];
+            if (g->im)
+                g->im[at] *= f[j] * f[i];
+        }
+}
+
+static int nodes_make(const struct otf *t, double diffusion, double pixel, struct nodes *made)
+{
+    if (!(diffusion >= 0) || !isfinite(diffusion) || !(pixel >= 0) || !isfinite(pixel) || (!t->n && !t->p))
+        return E_RANGE;
+    struct nodes g = {.n = t->n, .du = t->du};
+    if (t->p) {
+        g.du = 1 / psf_period(t);
+        double half = floor(t->ucut / g.du + 1e-9);
+        if (!(half < 8192))
+            return E_RANGE;
+        g.n = 2 * (int)half + 1;
+    }
+    size_t count = (size_t)g.n * (size_t)g.n;
+    double *u = malloc(2 * (size_t)g.n * sizeof *u);
+    g.re = malloc(count * sizeof *g.re);
+    g.im = otf_is_real(t) ? NULL : malloc(count * sizeof *g.im);
+    int status = u && g.re && (g.im || otf_is_real(t)) ? OK : E_NOMEM;
+    if (status == OK) {
+        for (int i = 0; i < g.n; i++)
+            u[i] = (i - g.n / 2) * g.du;
+        if (t->p) {
+            status = otf_grid(t, g.n, u, g.n, u, g.re, g.im);
+        } else {
+            memcpy(g.re, t->re, count * sizeof *g.re);
+            if (g.im)
+                memcpy(g.im, t->im, count * sizeof *g.im);
+        }
+    }
+    if (status == OK)
+        apply_factors(t, diffusion, pixel, u, u + g.n, &g);
+    free(u);
+    if (status)
+        nodes_free(&g);
+    else
+        *made = g;
+    return status;
+}
+
+int psf_image(const struct otf *t, double diffusion, double pixel, int nx, int ny, double scale, double *image)
+{
+    if (nx < 1 || ny < 1 || !(scale > 0) || !((nx > ny ? nx : ny) * scale <= psf_period(t)))
+        return E_RANGE;
+    struct nodes g;
+    int status = nodes_make(t, diffusion, pixel, &g);
+    if (status)
+        return status;
+    size_t count = (size_t)g.n * (size_t)g.n, pixels = (size_t)nx * (size_t)ny;
+    double *in = malloc(2 * count * sizeof *in), *out = malloc(2 * pixels * sizeof *out);
+    status = in && out ? OK : E_NOMEM;
+    if (status == OK) {
+        for (size_t i = 0; i < count; i++) {
+            in[2 * i] = g.re[i];
+            in[2 * i + 1] = g.im ? g.im[i] : 0;
+        }
+        struct fft_grid from = {g.n, g.n, -(g.n / 2), -(g.n / 2)}, to = {nx, ny, -(nx - 1) / 2.0, -(ny - 1) / 2.0};
+        status = fft_zoom(&from, in, &to, out, g.du * scale, g.du * scale, +1);
+    }
+    double area = g.du * scale * g.du * scale;
+    for (size_t i = 0; status == OK && i < pixels; i++)
+        image[i] = out[2 * i] * area;
+    free(in);
+    free(out);
+    nodes_free(&g);
+    return status;
+}
+
+/* Round sums: S[k] at u[k] = du sqrt q, for the q that occur with S != 0; S includes du^2. */
+struct rings {
+    size_t n;
+    double *u, *s;
+};
+
+static void rings_free(struct rings *r)
+{
+    free(r->u);
+    free(r->s);
+}
+
+static int rings_make(const struct otf *t, double diffusion, double pixel, struct rings *made)
+{
+    struct nodes g;
+    int status = nodes_make(t, diffusion, pixel, &g);
+    if (status)
+        return status;
+    size_t h = (size_t)g.n / 2, q_count = 2 * h * h + 1;
+    struct rings r = {.u = malloc(q_count * sizeof *r.u), .s = calloc(q_count, sizeof *r.s)};
+    if (!r.u || !r.s) {
+        rings_free(&r);
+        nodes_free(&g);
+        return E_NOMEM;
+    }
+    for (int j = 0; j < g.n; j++)
+        for (int i = 0; i < g.n; i++) {
+            long x = i - (long)h, y = j - (long)h;
+            r.s[x * x + y * y] += g.re[(size_t)j * (size_t)g.n + (size_t)i];
+        }
+    for (size_t q = 0; q < q_count; q++)
+        if (r.s[q] != 0) {
+            r.u[r.n] = g.du * sqrt((double)q);
+            r.s[r.n++] = r.s[q] * g.du * g.du;
+        }
+    nodes_free(&g);
+    *made = r;
+    return OK;
+}
+
+static double rings_profile(const struct rings *r, double radius)
+{
+    double sum = 0, k = 2 * M_PI * radius;
+    for (size_t i = 0; i < r->n; i++)
+        sum += r->s[i] * j0(k * r->u[i]);
+    return sum;
+}
+
+static double rings_inside(const struct rings *r, double radius)
+{
+    double sum = 0, k = 2 * M_PI * radius;
+    for (size_t i = 0; i < r->n; i++)
+        sum += r->s[i] * (r->u[i] > 0 ? j1(k * r->u[i]) / r->u[i] : M_PI * radius);
+    return sum * radius;
+}
+
+int psf_profile(const struct otf *t, double diffusion, double pixel, int n, const double *radius, double *mean)
+{
+    for (int i = 0; i < n; i++)
+        if (!(radius[i] >= 0 && radius[i] <= psf_period(t) / 4))
+            return E_RANGE;
+    struct rings r;
+    int status = rings_make(t, diffusion, pixel, &r);
+    if (status)
+        return status;
+    for (int i = 0; i < n; i++)
+        mean[i] = rings_profile(&r, radius[i]);
+    rings_free(&r);
+    return OK;
+}
+
+int psf_encircled(const struct otf *t, double diffusion, double pixel, int n, const double *radius, double *inside)
+{
+    for (int i = 0; i < n; i++)
+        if (!(radius[i] >= 0 && radius[i] <= psf_period(t) / 2))
+            return E_RANGE;
+    struct rings r;
+    int status = rings_make(t, diffusion, pixel, &r);
+    if (status)
+        return status;
+    for (int i = 0; i < n; i++)
+        inside[i] = rings_inside(&r, radius[i]);
+    rings_free(&r);
+    return OK;
+}
+
+/*
+ * Steps of a quarter of the finest detail outwards until the profile is below half, then
+ * the Illinois variant of regula falsi to 1e-9 of the radius.
+ */
+static int half_radius(const struct rings *r, double limit, double *radius)
+{
+    double peak = rings_profile(r, 0), finest = 0;
+    for (size_t i = 0; i < r->n; i++)
+        if (fabs(r->s[i]) > 1e-6 * fabs(r->s[0]))
+            finest = r->u[i];
+    if (!(peak > 0) || !(finest > 0))
+        return E_NOCONV;
+    double step = 0.25 / finest, a = 0, fa = peak / 2, b = step, fb;
+    while ((fb = rings_profile(r, b) - peak / 2) > 0) {
+        a = b;
+        fa = fb;
+        b += fmax(step, b / 8);
+        if (!(b <= limit))
+            return E_NOCONV;
+    }
+    for (int i = 0; i < 60 && b - a > 1e-9 * b; i++) {
+        double c = (a * fb - b * fa) / (fb - fa), fc = rings_profile(r, c) - peak / 2;
+        if (fc > 0) {
+            a = c;
+            fa = fc;
+            fb /= 2;
+        } else {
+            b = c;
+            fb = fc;
+            fa /= 2;
+        }
+        if (fc == 0)
+            a = b = c;
+    }
+    *radius = (a + b) / 2;
+    return OK;
+}
+
+int psf_fwhm(const struct otf *t, double diffusion, double pixel, double *fwhm)
+{
+    struct rings r;
+    int status = rings_make(t, diffusion, pixel, &r);
+    if (status)
+        return status;
+    double radius;
+    status = half_radius(&r, psf_period(t) / 4, &radius);
+    rings_free(&r);
+    if (status == OK)
+        *fwhm = 2 * radius;
+    return status;
+}
+
+int psf_moment_index(int a, int b)
+{
+    int n = a + b;
+    return n * (n + 1) / 2 + b;
+}
+
+/*
+ * Transforms of x^a W(x), a = 0..4, at each u, with the shift to x0: f[(a*n + i)*2] complex,
+ * int x^a exp(-x^2/2w^2 + 2 pi i u (x + x0)) dx; 0 where the Gaussian is below 1e-40.
+ */
+static void weight_terms(int n, double du, double w, double x0, double *f)
+{
+    for (int i = 0; i < n; i++) {
+        double u = (i - n / 2) * du, k = 2 * M_PI * u, s = w * w * k, g = w * sqrt(2 * M_PI) * exp(-0.5 * s * k);
+        double h[5] = {1, s, w * w - s * s, 3 * w * w * s - s * s * s,
+                       3 * w * w * w * w - 6 * w * w * s * s + s * s * s * s};
+        double turn = remainder(u * x0, 1), c = g * cos(2 * M_PI * turn), d = g * sin(2 * M_PI * turn);
+        for (int a = 0; a < 5; a++) {
+            double *at = f + 2 * ((size_t)a * (size_t)n + (size_t)i);
+            /* odd a carry a factor i */
+            at[0] = h[a] * (a % 2 ? -d : c);
+            at[1] = h[a] * (a % 2 ? c : d);
+        }
+    }
+}
+
+/* Raw moments int W x^a y^b PSF over the nodes. */
+static void raw_moments(const struct nodes *g, const double *fx, const double *fy, double m[PSF_MOMENTS])
+{
+    int n = g->n;
+    memset(m, 0, PSF_MOMENTS * sizeof *m);
+    for (int j = 0; j < n; j++) {
+        const double *re = g->re + (size_t)j * (size_t)n, *im = g->im ? g->im + (size_t)j * (size_t)n : NULL;
+        if (hypot(fy[2 * j], fy[2 * j + 1]) < 1e-40)
+            continue;
+        for (int a = 0; a < 5; a++) {
+            const double *f = fx + 2 * (size_t)a * (size_t)n;
+            double sr = 0, si = 0;
+            for (int i = 0; i < n; i++) {
+                sr += re[i] * f[2 * i];
+                si += re[i] * f[2 * i + 1];
+            }
+            for (int i = 0; im && i < n; i++) {
+                sr -= im[i] * f[2 * i + 1];
+                si += im[i] * f[2 * i];
+            }
+            for (int b = 0; a + b < 5; b++) {
+                const double *q = fy + 2 * ((size_t)b * (size_t)n + (size_t)j);
+                m[psf_moment_index(a, b)] += sr * q[0] - si * q[1];
+            }
+        }
+    }
+    for (int k = 0; k < PSF_MOMENTS; k++)
+        m[k] *= g->du * g->du;
+}
+
+/* Moments on nodes already made. */
+static int nodes_moments(const struct nodes *g, double width, double x0, double y0, double m[PSF_MOMENTS])
+{
+    double *f = malloc(20 * (size_t)g->n * sizeof *f), v[PSF_MOMENTS];
+    if (!f)
+        return E_NOMEM;
+    weight_terms(g->n, g->du, width, x0, f);
+    weight_terms(g->n, g->du, width, y0, f + 10 * (size_t)g->n);
+    raw_moments(g, f, f + 10 * (size_t)g->n, v);
+    free(f);
+    if (!(v[0] > 0))
+        return E_NOCONV;
+    for (int k = 1; k < PSF_MOMENTS; k++)
+        v[k] /= v[0];
+    memcpy(m, v, sizeof v);
+    return OK;
+}
+
+static int moments_valid(const struct otf *t, double width, double x0, double y0)
+{
+    double period = psf_period(t);
+    return width > 0 && width <= period / 16 && fabs(x0) <= period / 4 && fabs(y0) <= period / 4;
+}
+
+int psf_moments(const struct otf *t, double diffusion, double pixel, double width, double x0, double y0,
+                double m[PSF_MOMENTS])
+{
+    if (!moments_valid(t, width, x0, y0))
+        return E_RANGE;
+    struct nodes g;
+    int status = nodes_make(t, diffusion, pixel, &g);
+    if (status)
+        return status;
+    status = nodes_moments(&g, width, x0, y0, m);
+    nodes_free(&g);
+    return status;
+}
+
+int psf_centroid(const struct otf *t, double diffusion, double pixel, double width, double *x0, double *y0)
+{
+    if (!moments_valid(t, width, 0, 0))
+        return E_RANGE;
+    struct nodes g = {0};
+    int status = nodes_make(t, diffusion, pixel, &g);
+    double x = 0, y = 0, m[PSF_MOMENTS], w2 = width * width;
+    for (int i = 0; status == OK; i++) {
+        status = i < 100 && moments_valid(t, width, x, y) ? nodes_moments(&g, width, x, y, m) : E_NOCONV;
+        if (status)
+            break;
+        /* Newton on S J_x, S J_y: the derivative by the centre is S (J_xx / w^2 - 1) etc. */
+        double a = 1 - m[3] / w2, b = -m[4] / w2, d = 1 - m[5] / w2, det = a * d - b * b;
+        double dx = m[1], dy = m[2];
+        if (a > 0.05 && d > 0.05 && det > 0.01) {
+            dx = (d * m[1] - b * m[2]) / det;
+            dy = (a * m[2] - b * m[1]) / det;
+        }
+        double reach = hypot(dx, dy) / width;
+        x += dx / fmax(1, reach);
+        y += dy / fmax(1, reach);
+        if (reach < 1e-10)
+            break;
+    }
+    nodes_free(&g);
+    if (status == OK) {
+        *x0 = x;
+        *y0 = y;
+    }
+    return status;
+}
