@@ -66,7 +66,10 @@ endif
 layers:    # check that common/ has an order and that only imageio knows cfitsio
 	@tests/layers
 
-check: all $(UNIT)    # run every test
+$(BUILD)/fault.so: tests/fault.c $(BUILD)/flags
+	$(CC) -D_GNU_SOURCE -O1 -fPIC -shared -o $@ $< -ldl
+
+check: all $(UNIT) $(BUILD)/fault.so    # run every test
 	tests/run $(UNIT) $(sort $(wildcard tests/cmd/*.sh tests/peer/*.sh))
 
 check-large: all $(UNIT)    # tests that need time or memory

@@ -1,0 +1,67 @@
+# Every program, with the n-th allocation, write, read, sync, rename, link, open
+# or close failing: it fails cleanly (status 1, one line, no output, nothing
+# left behind) or succeeds with the same bytes.
+so=$(dirname "$BIN")/build/fault.so
+for so in "$TOP/build/fault.so" "$BIN/../fault.so"; do [ -f "$so" ] && break; done
+if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then skip "a sanitizer's build cannot preload a fault library"; exit 0; fi
+[ -f "$so" ] || { fail "no $so"; exit 1; }
+
+psfgen --pupil-grid 64 --size 32 -o psf.fits
+galgen --field 12 -n 30 --models models.txt -o scene.txt
+simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 120,120 -o true.fits
+simage scene.txt --models models.txt -p psf.fits -x 0.1 --subpixel 2 --size 121,121 -o half.fits
+galgen --field 12 --stars -n 25 | simage - -p psf.fits -x 0.1 --size 120,120 | addnoise --depth 27.7 -o stars.fits
+addnoise --depth 27.7 true.fits -o noisy.fits
+dither -n 2 half.fits -o dith.fits
+detect noisy.fits -o cat.txt
+detect stars.fits -o scat.txt
+rrgshape --stars-only stars.fits scat.txt -o stars.rrg
+rrgshape noisy.fits cat.txt --stars stars.rrg -o shapes.txt
+cutcat shapes.txt --stars stars.rrg --snr 3 -o cut.txt
+ls >inputs
+
+clean_run() { # LABEL: judge the run in $st with output out, reference ref
+    if [ $st -eq 0 ]; then
+        cmp -s out ref || echo "$1: exit 0 with other bytes"
+    elif [ $st -ne 1 ]; then echo "$1: exit $st: $(head -c 200 err)"
+    else
+        [ "$(wc -l <err)" -eq 1 ] || echo "$1: $(wc -l <err) lines: $(head -c 200 err)"
+        [ -e out ] && echo "$1: left an output"
+    fi
+    ls -A | grep -vxF -f inputs | grep -vxE 'out|ref|err|inputs|count|wrong' | sed "s/^/$1: left /"
+}
+
+sweep() { # NAME COMMAND...: the command writes to "out"
+    local name=$1 kind n total step st; shift
+    "$@" -o ref 2>err || { fail "$name does not run: $(cat err)"; return; }
+    : >wrong
+    local runs=0
+    for kind in malloc write read fsync rename linkat open close; do
+        rm -f out
+        FAULT_KIND=$kind FAULT_AT=0 FAULT_COUNT=count LD_PRELOAD=$so "$@" -o out 2>err
+        total=$(cat count); step=$((total / 12 + 1))
+        for ((n = 1; n <= total; n += n < 6 ? 1 : step)); do
+            for last in '' 1; do
+                rm -f out
+                st=0
+                FAULT_KIND=$kind FAULT_AT=$n ${last:+env FAULT_LAST=1} env LD_PRELOAD=$so timeout 20 "$@" -o out >/dev/null 2>err || st=$?
+                clean_run "$kind $n of $total${last:+ and later}" >>wrong
+                runs=$((runs + 1))
+            done
+        done
+    done
+    if [ -s wrong ]; then fail "$name: $(wc -l <wrong) of $runs: $(head -4 wrong | tr '\n' ';')"
+    else pass "$name: $runs faults survived"; fi
+    rm -f out ref
+}
+sweep psfgen psfgen --pupil-grid 64 --size 32
+sweep galgen galgen --field 12 -n 30 --stars
+sweep simage simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 60,60
+sweep dither dither -n 2 half.fits
+sweep addnoise addnoise --depth 27.7 true.fits
+sweep drizzle drizzle dith.fits -x 0.1 --pixfrac 0.5
+sweep detect detect noisy.fits
+sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
+sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
+sweep fom fom cut.txt
+sweep fits2png fits2png noisy.fits
