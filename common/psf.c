@@ -51,13 +51,14 @@ static void apply_factors(const struct otf *t, double diffusion, double pixel, c
         }
 }
 
-static int nodes_make(const struct otf *t, double diffusion, double pixel, struct nodes *made)
+/* `finer` = 2 halves the spacing of the nodes of samples. */
+static int nodes_fine(const struct otf *t, double diffusion, double pixel, int finer, struct nodes *made)
 {
     if (!(diffusion >= 0) || !isfinite(diffusion) || !(pixel >= 0) || !isfinite(pixel) || (!t->n && !t->p))
         return E_RANGE;
     struct nodes g = {.n = t->n, .du = t->du};
     if (t->p) {
-        g.du = 1 / psf_period(t);
+        g.du = 1 / psf_period(t) / finer;
         double half = floor(t->ucut / g.du + 1e-9);
         if (!(half < 8192))
             return E_RANGE;
@@ -87,6 +88,59 @@ static int nodes_make(const struct otf *t, double diffusion, double pixel, struc
     else
         *made = g;
     return status;
+}
+
+static int nodes_make(const struct otf *t, double diffusion, double pixel, struct nodes *made)
+{
+    return nodes_fine(t, diffusion, pixel, 1, made);
+}
+
+/* Drop the outer nodes, all below 1e-6 of T(0). */
+static void nodes_trim(struct nodes *g)
+{
+    int h = g->n / 2, keep = 0;
+    double least = 1e-6 * fabs(g->re[(size_t)h * (size_t)g->n + (size_t)h]);
+    for (int j = -h; j <= h; j++)
+        for (int i = -h; i <= h; i++) {
+            size_t at = (size_t)(j + h) * (size_t)g->n + (size_t)(i + h);
+            int reach = abs(i) > abs(j) ? abs(i) : abs(j);
+            if (reach > keep && hypot(g->re[at], g->im ? g->im[at] : 0) >= least)
+                keep = reach;
+        }
+    keep = keep < h ? keep + 1 : h;
+    int n = 2 * keep + 1;
+    for (int j = 0; j < n; j++) {
+        size_t from = (size_t)(j + h - keep) * (size_t)g->n + (size_t)(h - keep), to = (size_t)j * (size_t)n;
+        memmove(g->re + to, g->re + from, (size_t)n * sizeof *g->re);
+        if (g->im)
+            memmove(g->im + to, g->im + from, (size_t)n * sizeof *g->im);
+    }
+    g->n = n;
+}
+
+int psf_table(const struct otf *t, double diffusion, double pixel, struct otf *out)
+{
+    struct nodes g = {0};
+    if (t->chdiff < 0 || (pixel > 0 && t->pixel > 0))
+        return E_RANGE;
+    int status = nodes_fine(t, diffusion, pixel, 2, &g);
+    if (status)
+        return status;
+    double ucut = t->ucut;
+    if (t->p) {
+        nodes_trim(&g);
+        ucut = fmin(ucut, (g.n / 2) * g.du);
+    }
+    struct otf made;
+    status = otf_nodes(&made, g.n, g.du, ucut, g.re, g.im);
+    if (status) {
+        nodes_free(&g);
+        return status;
+    }
+    made.chdiff = hypot(t->chdiff, diffusion);
+    made.pixel = fmax(t->pixel, pixel);
+    *out = made;
+    return OK;
 }
 
 int psf_image(const struct otf *t, double diffusion, double pixel, int nx, int ny, double scale, double *image)

@@ -21,6 +21,12 @@
 double psf_period(const struct otf *t);
 
 /*
+ * out = table, without spline, of t times the factors; out->chdiff and ->pixel tell all that is in it.  The
+ * nodes of a table stay; samples get nodes 1 / (2 period) apart and a cut-off outside of which |T| < 1e-6 T(0).
+ */
+MUST_CHECK int psf_table(const struct otf *t, double diffusion, double pixel, struct otf *out);
+
+/*
  * image[iy*nx + ix] = scale^2 * PSF at ((ix - (nx-1)/2) scale, (iy - (ny-1)/2) scale): samples, not
  * integrals, unless `pixel` = scale; the sum tends to the flux inside.  Exact sum over the
  * nodes of t.  nx, ny >= 1; E_RANGE when a side is longer than the period.

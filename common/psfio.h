@@ -41,8 +41,8 @@ MUST_CHECK int psf_read(const char *name, const struct psf_options *o, struct ot
                         struct err *e);
 
 /*
- * Write image (nx x ny doubles, float32 in the file) and the table t with the cards h in both;
- * CRPIX, CDELT, EXTNAME are added here.  `record` becomes HISTORY.
+ * Write image (nx x ny doubles, float32 in the file) and the table t with the cards h in both:
+ * PIXELSCL at least; CRPIX, CDELT, EXTNAME, UCUT are added here.  `record` becomes HISTORY.
  */
 MUST_CHECK int psf_write(const char *name, int nx, int ny, const double *image, const struct otf *t,
                          const struct header *h, const char *record, const char *const *inputs,
