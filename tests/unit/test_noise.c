@@ -68,7 +68,7 @@ static void each_effect(void)
         at += a[i] == 60;
         above += a[i] > 60;
     }
-    check_that(!st && above == 0 && n.saturated > 0.05 * N && at >= n.saturated,
+    check_that(!st && above == 0 && n.saturated > N / 20 && at >= n.saturated,
                "saturation cuts at 60: %ld pixels cut, %ld at the level, %ld above", n.saturated, at, above);
 }
 
