@@ -1,0 +1,141 @@
+/*
+ * exposure.c - the exposures of a FITS file.
+ */
+#include "exposure.h"
+#include "fileio.h"
+#include "sky.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* 1 when the name's suffix, not the file itself, selects an HDU; -1 without memory. */
+static int has_suffix(const char *name)
+{
+    char *path, *suffix;
+    if (file_split(name, &path, &suffix))
+        return -1;
+    int has = suffix != NULL;
+    free(path);
+    free(suffix);
+    return has;
+}
+
+int exposure_list(const struct fits_in *f, const char *name, int **list, size_t *n, struct err *e)
+{
+    const int count = fits_in_count(f), one = fits_in_selected(f), suffix = has_suffix(name);
+    int *found = suffix < 0 ? NULL : malloc((size_t)count * sizeof *found);
+    if (!found)
+        return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
+    size_t k = 0;
+    for (int i = 0; i < count && !suffix; i++) {
+        const struct hdu *h = fits_in_hdu(f, i);
+        if (h->is_image && strcasecmp(h->extname, "SCI") == 0)
+            found[k++] = i;
+    }
+    if (k == 0 && one >= 0 && fits_in_hdu(f, one)->is_image)
+        found[k++] = one;
+    int st = k ? OK : err_set(e, E_DATA, "%s: no image in it", name);
+    for (size_t i = 0; i < k && st == OK; i++)
+        if (fits_in_hdu(f, found[i])->nz != 1)
+            st = err_set(e, E_DATA, "%s: HDU %d is a cube: select planes before", name, found[i]);
+    if (st) {
+        free(found);
+        return st;
+    }
+    *list = found;
+    *n = k;
+    return OK;
+}
+
+void exposure_label(const struct fits_in *f, const char *name, int index, char *label, size_t size)
+{
+    const struct hdu *h = fits_in_hdu(f, index);
+    if (index == 0 || has_suffix(name) > 0)
+        snprintf(label, size, "%s", name);
+    else if (h->extname[0])
+        snprintf(label, size, "%s[%s,%ld]", name, h->extname, h->extver);
+    else
+        snprintf(label, size, "%s[%d]", name, index);
+}
+
+static enum exposure_unit unit_of(const struct header *h)
+{
+    char unit[72];
+    static const struct { const char *text; enum exposure_unit unit; } names[] = {
+        {"electron", UNIT_ELECTRON}, {"electrons", UNIT_ELECTRON}, {"e-", UNIT_ELECTRON}, {"e", UNIT_ELECTRON},
+        {"electron/s", UNIT_RATE}, {"electrons/s", UNIT_RATE}, {"electron s-1", UNIT_RATE}, {"e-/s", UNIT_RATE},
+        {"adu", UNIT_ADU}, {"dn", UNIT_ADU}, {"count", UNIT_ADU}, {"counts", UNIT_ADU},
+    };
+    if (header_str(h, "BUNIT", unit, sizeof unit) || !unit[0])
+        return UNIT_NONE;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcasecmp(unit, names[i].text) == 0)
+            return names[i].unit;
+    return UNIT_OTHER;
+}
+
+int exposure_read(struct fits_in *f, const char *name, int index, struct exposure *x, struct err *e)
+{
+    const struct hdu *hdu = fits_in_hdu(f, index);
+    struct exposure new = {.index = index, .nx = hdu->nx, .ny = hdu->ny, .expnum = -1};
+    char label[400];
+    exposure_label(f, name, index, label, sizeof label);
+    int st = fits_in_header(f, index, &new.hdr, e);
+    if (st)
+        return st;
+    new.unit = unit_of(&new.hdr);
+    new.exptime = header_double_or(&new.hdr, "EXPTIME", NAN);
+    new.tottime = header_double_or(&new.hdr, "TOTTIME", new.exptime);
+    new.magzero = header_double_or(&new.hdr, "MAGZERO", NAN);
+    new.scale = header_double_or(&new.hdr, "PIXSCALE", NAN);
+    if (header_long(&new.hdr, "EXPNUM", &new.expnum))
+        new.expnum = -1;
+    struct sky *s;
+    if (sky_open(&s, &new.hdr, NULL) == OK) {
+        double scale = sky_scale(s);
+        sky_close(s);
+        if (isnan(new.scale))
+            new.scale = scale;
+        else if (!(fabs(scale - new.scale) <= 1e-3 * new.scale))
+            st = err_set(e, E_DATA, "%s: PIXSCALE %g and the WCS's %g arcsec differ: correct one", label, new.scale, scale);
+    }
+    if (st == OK && (new.exptime <= 0 || new.tottime <= 0))
+        st = err_set(e, E_DATA, "%s: EXPTIME or TOTTIME is not positive", label);
+    if (st == OK && new.scale <= 0)
+        st = err_set(e, E_DATA, "%s: PIXSCALE %g is not positive", label, new.scale);
+    if (st)
+        header_free(&new.hdr);
+    else
+        *x = new;
+    return st;
+}
+
+int exposure_rescale_wcs(struct header *h, double shift_x, double shift_y, double factor)
+{
+    static const char *const scaled[] = {"CD1_1", "CD1_2", "CD2_1", "CD2_2", "CDELT1", "CDELT2"};
+    const double shift[2] = {shift_x, shift_y};
+    double v;
+    int st = OK;
+    for (int i = 0; i < 2 && st == OK; i++) {
+        const char *key = i ? "CRPIX2" : "CRPIX1";
+        if (header_double(h, key, &v) == OK)
+            st = header_set_double(h, key, (v - 1 - shift[i]) / factor + 1, "reference pixel, first is 1");
+    }
+    for (size_t i = 0; i < sizeof scaled / sizeof *scaled && st == OK; i++)
+        if (header_double(h, scaled[i], &v) == OK)
+            st = header_set_double(h, scaled[i], v * factor, i < 4 ? "deg per pixel" : NULL);
+    return st;
+}
+
+void exposure_remove_wcs(struct header *h)
+{
+    static const char *const keys[] = {
+        "WCSAXES*", "WCSNAME*", "CTYPE*", "CRVAL*", "CRPIX*", "CDELT*", "CUNIT*", "CROTA*", "CD1_*", "CD2_*",
+        "PC1_*", "PC2_*", "PV1_*", "PV2_*", "PS1_*", "PS2_*", "LONPOLE*", "LATPOLE*", "RADESYS*", "RADECSYS",
+        "EQUINOX*", "A_*", "B_*", "AP_*", "BP_*", "A_ORDER", "B_ORDER", "AP_ORDER", "BP_ORDER",
+    };
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        header_remove(h, keys[i]);
+}
