@@ -1,0 +1,486 @@
+/*
+ * plan.c - which path every object takes and how large its stamp is.
+ *
+ * Half side of a stamp = max(radius beyond which PSF wings of that flux stay
+ * below the tolerance, radius beyond which the object itself does) + margins;
+ * tolerance = max(eps peak, floor).
+ */
+#include "plan.h"
+#include "shapelet.h"
+#include "shear.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SIDES 20
+
+/* Sides of stamps with fast transforms. */
+static const int side_of[SIDES] = {12, 16, 20, 32, 50, 64, 80, 100, 128, 160, 200, 256,
+                                   320, 400, 512, 640, 800, 1024, 1600, 2048};
+
+/* An object's transformation: parity, then rotation by `turn`, then shear g. */
+struct pose {
+    double turn, g1, g2, g;
+};
+
+/* Field shear times own shear = shear g times a rotation (polar decomposition). */
+static int pose_of(const struct view *v, const struct emitter *s, struct pose *q)
+{
+    double own[4], field[4], a[4];
+    *q = (struct pose){.turn = s->rotation, .g1 = v->g1, .g2 = v->g2};
+    int series = v->shear_order > 0;
+    if (series)
+        *q = (struct pose){.turn = s->rotation, .g1 = s->g1, .g2 = s->g2};
+    else if (s->g1 != 0 || s->g2 != 0) {
+        if (shear_matrix(s->g1, s->g2, own) || shear_matrix(v->g1, v->g2, field))
+            return E_RANGE;
+        a[0] = field[0] * own[0] + field[1] * own[2];
+        a[1] = field[0] * own[1] + field[1] * own[3];
+        a[2] = field[2] * own[0] + field[3] * own[2];
+        a[3] = field[2] * own[1] + field[3] * own[3];
+        double turn = atan2(a[2] - a[1], a[0] + a[3]), c = cos(turn), d = sin(turn);
+        double s11 = a[0] * c - a[1] * d, s12 = a[0] * d + a[1] * c, s22 = a[2] * d + a[3] * c;
+        q->turn += turn;
+        q->g1 = (s11 - s22) / (s11 + s22);
+        q->g2 = 2 * s12 / (s11 + s22);
+    }
+    q->g = hypot(q->g1, q->g2);
+    return q->g < 1 && hypot(v->g1, v->g2) < 1 ? OK : E_RANGE;
+}
+
+/* Everything the decision about one object needs, reused for all. */
+struct maker {
+    struct plan *p;
+    struct envelope env;
+    double shells[SHAPELET_NMAX + 1];
+    double turn_table;     /* 1 when some object is turned */
+    int used[SIDES];       /* grid number of a side class + 1 */
+};
+
+static double stretch_of(double g)
+{
+    return sqrt((1 + g) / (1 - g));
+}
+
+/* Estimates that all decisions share, per object. */
+struct light {
+    double beta;           /* after dilation */
+    double power;          /* sum c^2 after dilation, 1/arcsec^2 */
+    double stretch;        /* largest, of all shears */
+    double peak;           /* lower estimate of the peak pixel, fraction of the flux */
+    double tol;            /* allowed error of a pixel over |flux| */
+};
+
+static int light_of(struct maker *m, const struct emitter *s, const struct pose *q, struct light *l)
+{
+    const struct plan *p = m->p;
+    const double theta2 = p->view.pixel * p->view.pixel;
+    double star = p->view.psf ? p->wings.peak : 1;
+    *l = (struct light){.beta = s->beta * s->dilation, .stretch = stretch_of(q->g), .peak = star};
+    if (p->view.shear_order)
+        l->stretch *= stretch_of(hypot(p->view.g1, p->view.g2));
+    if (s->coef) {
+        envelope_shells(s->nmax, s->coef, m->shells);
+        for (int n = 0; n <= s->nmax; n++) {
+            m->shells[n] /= s->dilation;
+            l->power += m->shells[n] * m->shells[n];
+        }
+        l->peak = l->power > 0 ? 1 / (1 / (theta2 * l->power) + 1 / star) : 0;
+    }
+    l->tol = fmax(p->acc.eps * l->peak, p->acc.floor / fabs(s->flux));
+    return l->tol > 0 && l->beta >= 0 && isfinite(l->beta) && isfinite(l->power) ? OK : E_DATA;
+}
+
+/* Radius, arcsec, beyond which the object's own light stays below its share. */
+static double own_reach(const struct maker *m, const struct emitter *s, const struct light *l)
+{
+    const double theta2 = m->p->view.pixel * m->p->view.pixel;
+    double limit = m->p->acc.edge * l->tol * l->beta / theta2;
+    return envelope_reach(&m->env, s->nmax, m->shells, limit) * l->beta * l->stretch;
+}
+
+/* ---- coefficient-space shear ---- */
+
+/* Even number of orders to add so that the cut stays below its share of the tolerance. */
+static int growth_of(const struct plan *p, const struct emitter *s, const struct light *l, double g)
+{
+    const double theta2 = p->view.pixel * p->view.pixel;
+    double eps = p->acc.shear * l->tol / (theta2 * l->power + 1e-300);
+    eps = eps > 0.1 ? 0.1 : eps < 1e-15 ? 1e-15 : eps;
+    int grow = shear_growth(s->nmax, g, eps);
+    return grow < 2 ? 2 : (grow + 1) & ~1;
+}
+
+/* Number of the matrix (nmax -> nout) of the field's shear, made when new; -1 when there is no memory. */
+static int matrix_for(struct plan *p, int nmax, int nout)
+{
+    for (int i = 0; i < p->n_matrix; i++)
+        if (p->matrix[i].nmax == nmax && p->matrix[i].nout == nout)
+            return i;
+    if (p->n_matrix == 256)
+        return -1;
+    struct matrix *grown = realloc(p->matrix, ((size_t)p->n_matrix + 1) * sizeof *grown);
+    if (!grown)
+        return -1;
+    p->matrix = grown;
+    const size_t in = shapelet_count(nmax), out = shapelet_count(nout);
+    double *m = malloc(in * out * sizeof *m), *unit = calloc(in + out, sizeof *unit);
+    int st = m && unit ? OK : E_NOMEM;
+    if (st == OK && p->view.shear_order == 0)
+        st = shear_matrix_coeff(nmax, nout, p->view.g1, p->view.g2, m);
+    for (size_t j = 0; st == OK && p->view.shear_order && j < in; j++) {
+        unit[j] = 1;
+        st = shear_series(nmax, unit, p->view.g1, p->view.g2, p->view.shear_order, unit + in);
+        unit[j] = 0;
+        for (size_t i = 0; i < out; i++)
+            m[i * in + j] = unit[in + i];
+    }
+    free(unit);
+    if (st) {
+        free(m);
+        return -1;
+    }
+    p->matrix[p->n_matrix] = (struct matrix){nmax, nout, m};
+    p->bytes += (double)(in * out) * sizeof *m;
+    return p->n_matrix++;
+}
+
+/* How the shear of one object is done: fills mapped, matrix, grown of d. */
+static int choose_shear(struct plan *p, const struct emitter *s, const struct pose *q, const struct light *l,
+                        struct draw *d)
+{
+    const int shared = s->g1 == 0 && s->g2 == 0;
+    if (p->view.shear_order) {
+        int n = s->nmax;
+        if (!shared && q->g > 0) {
+            n += growth_of(p, s, l, q->g);
+            if (n > p->acc.order_max)
+                n = p->acc.order_max;
+            d->grown = (short)(n > s->nmax ? n : s->nmax);
+            n = d->grown;
+        }
+        int field = p->view.g1 != 0 || p->view.g2 != 0;
+        if (field)
+            d->matrix = (short)matrix_for(p, n, n + 2 * p->view.shear_order);
+        return field && d->matrix < 0 ? E_DATA : OK;
+    }
+    if (q->g == 0 || q->g2 == 0)           /* along the axes: two scales, exact */
+        return OK;
+    int n = s->nmax + growth_of(p, s, l, q->g);
+    if (n > p->acc.order_max || (p->view.psf && q->g > p->acc.g_matrix)) {
+        d->mapped = 1;
+        return s->nmax <= SHAPELET_ROTMAX ? OK : E_DATA;
+    }
+    if (shared)
+        d->matrix = (short)matrix_for(p, s->nmax, n);
+    else if (p->view.psf)
+        d->mapped = 1;
+    else
+        d->grown = (short)n;
+    if (shared && d->matrix < 0)
+        d->mapped = 1;
+    return OK;
+}
+
+/* ---- stamps ---- */
+
+/* Square stamp of n pixels whose middle pixel holds the origin; 0 when it does not touch the image. */
+static int place(const struct view *v, const struct emitter *s, int n, struct draw *d)
+{
+    if (!(fabs(s->x) < 1e8 && fabs(s->y) < 1e8))
+        return 0;
+    d->nx = d->ny = n;
+    d->x0 = (int)floor(s->x + 0.5) - n / 2;
+    d->y0 = (int)floor(s->y + 0.5) - n / 2;
+    return d->x0 < v->nx && d->y0 < v->ny && d->x0 + n > 0 && d->y0 + n > 0;
+}
+
+/* Pixels of an axis of n that touch origin +- reach: first and number; 0 when none does. */
+static int span(double origin, double reach, long n, int *first, int *count)
+{
+    double lo = fmax(ceil(origin - reach - 0.5), 0), hi = fmin(floor(origin + reach + 0.5), (double)n - 1);
+    if (!(lo <= hi))
+        return 0;
+    *first = (int)lo;
+    *count = (int)(hi - lo) + 1;
+    return 1;
+}
+
+/* With a PSF: side class and frequencies. Returns 0 when the object does not reach the image. */
+static int plan_fourier(struct maker *m, const struct emitter *s, const struct light *l, struct draw *d)
+{
+    struct plan *p = m->p;
+    const struct wings *w = &p->wings;
+    double own = 0, size = 0;
+    if (s->coef) {
+        double core = w->core / (l->beta * l->stretch);
+        size = l->power > 0 ? 1 / sqrt(2 * M_PI * l->power) : 0;
+        own = own_reach(m, s, l) * sqrt(1 + core * core);
+    }
+    int side = 0, good;
+    for (;; side++) {
+        double half = (side_of[side] / 2 - 1) * p->view.pixel;
+        good = half >= own && wings_folded(w, half - size, half, side_of[side]) <= p->acc.wing * l->tol;
+        if (good || side == SIDES - 1 || side_of[side + 1] > p->acc.side_max)
+            break;
+    }
+    if (!place(&p->view, s, side_of[side], d))
+        return 0;
+    p->n_short += !good;
+
+    /* smallest frequency beyond which bound of |F| times integral of |T| stays below its share */
+    double limit = p->acc.band * l->tol;
+    int lo = 0, hi = w->nu - 1;
+    while (lo < hi) {
+        int mid = (lo + hi) / 2;
+        double f = 1;
+        if (s->coef)
+            f = fmin(10, 2 * M_PI * l->beta
+                     * envelope_value(&m->env, s->nmax, m->shells, 2 * M_PI * l->beta * mid * w->du / l->stretch));
+        if (f * w->tail[mid] <= limit)
+            hi = mid;
+        else
+            lo = mid + 1;
+    }
+    d->kcut = (float)(ceil(lo * w->du * side_of[side] * p->view.pixel) + 1);
+    d->grid = (short)side;                 /* side class; becomes the number of a grid later */
+    m->used[side] = 1;
+    return 1;
+}
+
+/* Without a PSF. */
+static int plan_direct(struct maker *m, const struct emitter *s, const struct pose *q, const struct light *l,
+                       struct draw *d)
+{
+    const struct view *v = &m->p->view;
+    if (!s->coef) {
+        d->path = PATH_POINT;
+        return place(v, s, 4, d);
+    }
+    double reach = own_reach(m, s, l) / v->pixel, rx = reach, ry = reach;
+    if (q->g2 == 0 && !v->shear_order) {   /* along the axes */
+        double e = sqrt((1 + q->g1) / (1 - q->g1));
+        rx = reach / l->stretch * e;
+        ry = reach / l->stretch / e;
+    }
+    d->path = d->mapped ? PATH_MAPPED : PATH_CLOSED;
+    return span(s->x, rx, v->nx, &d->x0, &d->nx) && span(s->y, ry, v->ny, &d->y0, &d->ny);
+}
+
+/* CPU seconds for one object; constants measured on one machine, good to a factor 2. */
+static double cost_of(const struct plan *p, const struct emitter *s, const struct draw *d)
+{
+    double area = (double)d->nx * d->ny, orders = s->coef ? s->nmax + 1 : 0;
+    if (d->matrix >= 0)
+        orders = p->matrix[d->matrix].nout + 1;
+    double matrix = d->matrix >= 0 ? 0.2e-9 * (double)shapelet_count(s->nmax) * orders * orders : 0;
+    if (d->path == PATH_CLOSED)
+        return 1e-6 + matrix + 0.25e-9 * orders * area + 10e-9 * orders * (d->nx + d->ny);
+    if (d->path == PATH_MAPPED)
+        return 5e-6 + 100e-9 * orders * area;
+    if (d->path != PATH_FOURIER)
+        return 1e-7;
+    const struct stamp_grid *g = &p->grid[d->grid];
+    double k = fmin(d->kcut, g->kmax), plane = 0.8 * k * k;
+    double rows = d->mapped ? plane * (20e-9 + 2e-9 * orders) : plane * (0.25e-9 * orders + 1.5e-9);
+    return 1.5e-6 + matrix + rows + 1e-9 * orders * orders * k / 8 + area * (0.8e-9 + 0.25e-9 * log2(d->nx));
+}
+
+static int plan_one(struct maker *m, size_t i)
+{
+    struct plan *p = m->p;
+    const struct emitter *s = &p->emitter[i];
+    struct draw *d = &p->draw[i];
+    struct pose q;
+    struct light l;
+    d->matrix = -1;
+    if (!isfinite(s->flux) || !isfinite(s->rotation) || !isfinite(s->x) || !isfinite(s->y)
+        || (s->coef && (!(s->beta > 0) || !(s->dilation > 0))) || pose_of(&p->view, s, &q))
+        return E_DATA;
+    if (s->flux == 0)
+        return OK;
+    if (light_of(m, s, &q, &l))
+        return s->coef && l.power == 0 ? OK : E_DATA;
+    if (s->coef) {
+        if (q.turn != 0 && s->nmax > SHAPELET_ROTMAX)
+            return E_DATA;
+        int st = choose_shear(p, s, &q, &l, d);
+        if (st)
+            return st;
+    }
+    if (p->view.psf) {
+        d->path = plan_fourier(m, s, &l, d) ? PATH_FOURIER : PATH_NONE;
+    } else if (!plan_direct(m, s, &q, &l, d)) {
+        d->path = PATH_NONE;
+    }
+    return OK;
+}
+
+/* Highest order after shear, for scratch memory; and the rotation table when something is turned. */
+static int finish_orders(struct maker *m)
+{
+    struct plan *p = m->p;
+    int turned = -1;
+    for (size_t i = 0; i < p->n; i++) {
+        const struct emitter *s = &p->emitter[i];
+        if (!s->coef || p->draw[i].path == PATH_NONE)
+            continue;
+        int n = p->draw[i].matrix >= 0 ? p->matrix[p->draw[i].matrix].nout : s->nmax;
+        n = p->draw[i].grown > n ? p->draw[i].grown : n;
+        p->nmax = n > p->nmax ? n : p->nmax;
+        if ((s->rotation != 0 || s->g1 != 0 || s->g2 != 0) && s->nmax > turned)
+            turned = s->nmax;
+    }
+    p->rotation_nmax = turned;
+    if (turned < 0)
+        return OK;
+    p->rotation = malloc(shapelet_rotation_count(turned) * sizeof *p->rotation);
+    if (!p->rotation)
+        return E_NOMEM;
+    return shapelet_rotation_table(turned, p->rotation);
+}
+
+/* Tables of the side classes in use; draw.grid becomes their numbers. */
+static int finish_grids(struct maker *m)
+{
+    struct plan *p = m->p;
+    const struct stamp_response r = {p->view.diffusion, p->view.no_pixel ? 0 : p->view.pixel};
+    p->grid = calloc(SIDES, sizeof *p->grid);
+    if (!p->grid)
+        return E_NOMEM;
+    for (int side = 0; side < SIDES; side++) {
+        if (!m->used[side])
+            continue;
+        int st = stamp_grid_new(&p->grid[p->n_grid], p->view.psf, &r, p->view.pixel, side_of[side]);
+        if (st)
+            return st;
+        p->fft_plans++;
+        p->bytes += stamp_grid_bytes(p->view.psf->ucut, p->view.pixel, side_of[side], !otf_is_real(p->view.psf));
+        m->used[side] = ++p->n_grid;
+    }
+    for (size_t i = 0; i < p->n; i++)
+        if (p->draw[i].path == PATH_FOURIER)
+            p->draw[i].grid = (short)(m->used[p->draw[i].grid] - 1);
+    return OK;
+}
+
+static int make(struct maker *m)
+{
+    struct plan *p = m->p;
+    int nmax = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        if (p->emitter[i].coef && (p->emitter[i].nmax < 0 || p->emitter[i].nmax > SHAPELET_NMAX))
+            return E_RANGE;
+        if (p->emitter[i].coef && p->emitter[i].nmax > nmax)
+            nmax = p->emitter[i].nmax;
+    }
+    int st = envelope_new(&m->env, nmax);
+    if (st == OK && p->view.psf) {
+        const struct stamp_response r = {p->view.diffusion, p->view.no_pixel ? 0 : p->view.pixel};
+        st = wings_new(&p->wings, p->view.psf, &r, p->view.pixel);
+        p->fft_plans++;
+    }
+    for (size_t i = 0; i < p->n && st == OK; i++) {
+        st = plan_one(m, i);
+        if (st == E_DATA) {
+            p->n_bad++;
+            p->draw[i].path = PATH_NONE;
+            st = OK;
+        }
+    }
+    if (st == OK)
+        st = finish_orders(m);
+    if (st == OK && p->view.psf)
+        st = finish_grids(m);
+    for (size_t i = 0; i < p->n && st == OK; i++) {
+        p->count[p->draw[i].path]++;
+        p->cost += cost_of(p, &p->emitter[i], &p->draw[i]);
+    }
+    return st;
+}
+
+int scene_plan(struct plan *p, const struct view *v, const struct accuracy *a, size_t n,
+               const struct emitter *emitter)
+{
+    if (v->nx < 1 || v->ny < 1 || v->nx > 65535 || v->ny > 65535 || !(v->pixel > 0) || !isfinite(v->pixel)
+        || !(hypot(v->g1, v->g2) < 1) || v->shear_order < 0 || v->shear_order > 8 || !(a->eps > 0)
+        || !(a->floor >= 0) || !(v->diffusion >= 0) || (v->diffusion > 0 && !v->psf))
+        return E_RANGE;
+    struct plan made = {.view = *v, .acc = *a, .n = n, .emitter = emitter, .rotation_nmax = -1};
+    struct maker m = {.p = &made};
+    made.draw = calloc(n ? n : 1, sizeof *made.draw);
+    made.bytes = (double)n * sizeof *made.draw;
+    int st = made.draw ? make(&m) : E_NOMEM;
+    envelope_free(&m.env);
+    if (st)
+        plan_free(&made);
+    else
+        *p = made;
+    return st;
+}
+
+void plan_free(struct plan *p)
+{
+    for (int i = 0; i < p->n_grid; i++)
+        stamp_grid_free(&p->grid[i]);
+    for (int i = 0; i < p->n_matrix; i++)
+        free(p->matrix[i].m);
+    free(p->grid);
+    free(p->matrix);
+    free(p->rotation);
+    free(p->draw);
+    wings_free(&p->wings);
+    *p = (struct plan){0};
+}
+
+size_t plan_scratch(const struct plan *p)
+{
+    return shapelet_count(p->nmax);
+}
+
+int plan_shape(const struct plan *p, size_t i, double *scratch, struct shape *s)
+{
+    const struct emitter *o = &p->emitter[i];
+    const struct draw *d = &p->draw[i];
+    const size_t n = plan_scratch(p);
+    double *here = scratch, *next = scratch + n;
+    struct pose q;
+    *s = (struct shape){0};
+    if (!o->coef)
+        return OK;
+    int st = pose_of(&p->view, o, &q);
+    const size_t nc = shapelet_count(o->nmax);
+    for (size_t k = 0; k < nc; k++)
+        here[k] = o->coef[k] / o->dilation;
+    if (o->parity < 0)
+        shapelet_mirror(o->nmax, here);
+    s->nmax = o->nmax;
+    s->beta_x = s->beta_y = o->beta * o->dilation;
+    if (st == OK && q.turn != 0) {
+        st = shapelet_rotate_by(o->nmax, p->rotation, q.turn, here, next);
+        here = next;
+        next = scratch;
+    }
+    if (st == OK && d->grown) {
+        st = shear_exact(o->nmax, here, q.g1, q.g2, d->grown, next);
+        s->nmax = d->grown;
+        double *swap = here;
+        here = next;
+        next = swap;
+    }
+    if (st == OK && d->matrix >= 0) {
+        const struct matrix *m = &p->matrix[d->matrix];
+        shear_apply(m->nmax, m->nout, m->m, here, next);
+        s->nmax = m->nout;
+        here = next;
+    } else if (st == OK && d->mapped) {
+        s->mapped = 1;
+        st = shear_matrix(q.g1, q.g2, s->a);
+    } else if (st == OK && !d->grown && q.g != 0 && !p->view.shear_order) {
+        double e = sqrt((1 + q.g1) / (1 - q.g1));   /* g2 = 0 */
+        s->beta_x *= e;
+        s->beta_y /= e;
+    }
+    s->coef = here;
+    return st;
+}

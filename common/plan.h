@@ -1,0 +1,104 @@
+/*
+ * plan.h - what a scene needs: which path every object takes, how large its
+ * stamp is, which frequencies and orders are kept, what that costs.
+ *
+ * An effect costs nothing unless the view calls for it: without a PSF no
+ * transfer function, wing profile or transform is made; without shear no matrix.
+ */
+#ifndef PIXSHEAR_PLAN_H
+#define PIXSHEAR_PLAN_H
+
+#include "accuracy.h"
+#include "err.h"
+#include "otf.h"
+#include "reach.h"
+#include "stamp.h"
+#include <stddef.h>
+
+/* One object of the scene.  Order of action: parity, rotation, dilation, own shear, field shear. */
+struct emitter {
+    double x, y;           /* pixels of the image, centre of the first is 0 */
+    double flux;           /* electrons in the whole exposure */
+    const double *coef;    /* shapelet coefficients of unit flux, 1/arcsec; NULL: a point */
+    int nmax;
+    int parity;            /* -1: mirrored, y -> -y */
+    double beta;           /* arcsec */
+    double rotation;       /* rad, anticlockwise */
+    double dilation;       /* > 0 */
+    double g1, g2;         /* own reduced shear */
+};
+
+/* The image to be made. */
+struct view {
+    long nx, ny;
+    double pixel;          /* arcsec */
+    int no_pixel;          /* values at pixel centres times pixel^2 instead of integrals */
+    double diffusion;      /* sigma of charge diffusion beyond what psf holds, arcsec; needs psf */
+    const struct otf *psf; /* NULL: none */
+    double g1, g2;         /* field shear, reduced */
+    int shear_order;       /* 0: exact; 1..8: series of that order */
+};
+
+enum path {
+    PATH_NONE,             /* outside, or no light */
+    PATH_POINT,            /* all flux into one pixel (no PSF) */
+    PATH_CLOSED,           /* pixel integrals in closed form (no PSF) */
+    PATH_MAPPED,           /* sheared pixel integrals, Gauss-Legendre along x (no PSF) */
+    PATH_FOURIER           /* k-space with alias folding */
+};
+#define PATH_COUNT 5
+
+/* How one object is drawn. */
+struct draw {
+    unsigned char path;
+    unsigned char mapped;  /* shear by evaluating the mapped basis */
+    short grid;            /* plan.grid */
+    short matrix;          /* plan.matrix or -1 */
+    short grown;           /* orders after an own coefficient-space shear, or 0 */
+    int x0, y0, nx, ny;    /* stamp: first pixel in the image, sides */
+    float kcut;            /* frequency steps kept */
+};
+
+/* Field shear in coefficients, shared by objects of one order. */
+struct matrix {
+    int nmax, nout;
+    double *m;             /* see shear_matrix_coeff; NULL until a thread-safe build */
+};
+
+struct plan {
+    struct view view;
+    struct accuracy acc;
+    size_t n;
+    const struct emitter *emitter;      /* not owned */
+    struct draw *draw;                /* n */
+    int n_grid;
+    struct stamp_grid *grid;          /* side classes in use */
+    int n_matrix;
+    struct matrix *matrix;
+    int rotation_nmax;                /* table for turned objects; -1: none turned */
+    double *rotation;
+    struct wings wings;               /* with a PSF */
+    int nmax;                         /* highest order drawn */
+
+    /* for reports */
+    size_t count[PATH_COUNT];
+    size_t n_short;                   /* stamps that side_max cut short of the wanted accuracy */
+    size_t n_bad;                     /* objects that are not numbers, or of an order that cannot be turned */
+    double cost;                      /* predicted CPU seconds on one thread */
+    double bytes;                     /* memory of tables and draws */
+    size_t fft_plans;                 /* FFT plans made: 0 without a PSF */
+};
+
+/* Decide for n objects (kept by reference). E_RANGE, E_NOMEM. */
+MUST_CHECK int scene_plan(struct plan *p, const struct view *v, const struct accuracy *a, size_t n,
+                          const struct emitter *emitter);
+void plan_free(struct plan *p);
+
+/*
+ * The shape to draw for object i: coefficients turned and sheared as planned.
+ * scratch: 3 * plan_scratch(p) doubles, one per thread; s->coef points into it or to the emitter.
+ */
+size_t plan_scratch(const struct plan *p);
+MUST_CHECK int plan_shape(const struct plan *p, size_t i, double *scratch, struct shape *s);
+
+#endif

@@ -1,0 +1,204 @@
+/* render.c - sums the stamps of a plan into an image. */
+#include "render.h"
+#include "fft.h"
+#include "par.h"
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BATCH_PIXELS 262144    /* doubles held by one batch of stamps: 2 MiB */
+#define CHUNK 4                /* objects a thread takes at a time */
+
+int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
+{
+    const struct draw *d = &p->draw[i];
+    const struct emitter *s = &p->emitter[i];
+    const struct view *v = &p->view;
+    const double x = s->x - d->x0, y = s->y - d->y0, box = v->no_pixel ? 0 : v->pixel;
+    struct shape shape;
+    int st = plan_shape(p, i, scratch, &shape);
+    if (st)
+        return st;
+    switch ((enum path)d->path) {
+    case PATH_POINT:
+        stamp_point(d->nx, d->ny, x, y, s->flux, out);
+        return OK;
+    case PATH_CLOSED:
+        return stamp_closed(w, &shape, v->pixel, box, d->nx, d->ny, x, y, s->flux, out);
+    case PATH_MAPPED:
+        return stamp_mapped(w, &shape, v->pixel, box, d->nx, d->ny, x, y, s->flux, out);
+    case PATH_FOURIER:
+        return stamp_fourier(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, out);
+    case PATH_NONE:
+        break;
+    }
+    return E_RANGE;
+}
+
+/* Objects to draw in order of their first row in the image, then of their number. */
+struct entry {
+    int row;
+    unsigned int index;
+};
+
+static int by_row(const void *a, const void *b)
+{
+    const struct entry *p = a, *q = b;
+    if (p->row != q->row)
+        return p->row < q->row ? -1 : 1;
+    return p->index < q->index ? -1 : p->index > q->index;
+}
+
+struct worker {
+    struct stamp_work *work;
+    double *scratch;
+};
+
+struct job {
+    const struct plan *p;
+    const struct entry *entry;     /* of this batch */
+    double **stamp;                /* where each of its stamps goes */
+    struct worker *worker;
+    struct progress *bar;
+};
+
+static int draw_some(void *ctx, long begin, long end, int worker)
+{
+    const struct job *j = ctx;
+    for (long i = begin; i < end; i++) {
+        int st = scene_stamp(j->p, j->entry[i].index, j->worker[worker].work, j->worker[worker].scratch,
+                             j->stamp[i]);
+        if (st)
+            return st;
+    }
+    if (j->bar)
+        progress_tick(j->bar, end - begin);
+    return OK;
+}
+
+/* Rows of doubles that slide up the image: row y lives at y % height. */
+struct window {
+    struct image *im;
+    double *row;
+    int height;
+    long next;                     /* first row not yet written to the image */
+};
+
+/* Write rows below `end` to the image and clear them. */
+static void window_move(struct window *w, long end)
+{
+    const size_t nx = (size_t)w->im->nx;
+    for (; w->next < end; w->next++) {
+        double *from = w->row + (size_t)(w->next % w->height) * nx;
+        float *to = w->im->pix + (size_t)w->next * nx;
+        for (size_t i = 0; i < nx; i++)
+            to[i] = (float)from[i];
+        memset(from, 0, nx * sizeof *from);
+    }
+}
+
+static void window_add(struct window *w, const struct draw *d, const double *stamp)
+{
+    const long nx = w->im->nx;
+    const long x0 = d->x0 < 0 ? 0 : d->x0, x1 = d->x0 + (long)d->nx > nx ? nx : d->x0 + (long)d->nx;
+    const long y0 = d->y0 < 0 ? 0 : d->y0, y1 = d->y0 + (long)d->ny > w->im->ny ? w->im->ny : d->y0 + (long)d->ny;
+    window_move(w, y0);
+    for (long y = y0; y < y1; y++) {
+        double *to = w->row + (size_t)(y % w->height) * (size_t)nx;
+        const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx;
+        for (long x = x0; x < x1; x++)
+            to[x] += from[x - d->x0];
+    }
+}
+
+/* Number of entries from `begin` whose stamps fit one batch (at least one), and where they go. */
+static size_t batch(const struct plan *p, const struct entry *e, size_t begin, size_t end, double *space,
+                    double **stamp)
+{
+    size_t used = 0, n = 0;
+    for (; begin + n < end && n < BATCH_PIXELS / 16; n++) {
+        const struct draw *d = &p->draw[e[begin + n].index];
+        size_t need = ((size_t)d->nx * (size_t)d->ny + 7) / 8 * 8;
+        if (n > 0 && used + need > BATCH_PIXELS)
+            break;
+        stamp[n] = space + used;
+        used += need;
+    }
+    return n;
+}
+
+static int run(const struct plan *p, size_t n, const struct entry *e, struct window *w, struct job *job,
+               double *space, int threads)
+{
+    for (size_t begin = 0; begin < n;) {
+        size_t m = batch(p, e, begin, n, space, job->stamp);
+        job->entry = e + begin;
+        int st = par_for((long)m, CHUNK, threads, draw_some, job);
+        if (st)
+            return st;
+        for (size_t i = 0; i < m; i++)
+            window_add(w, &p->draw[e[begin + i].index], job->stamp[i]);
+        begin += m;
+    }
+    window_move(w, w->im->ny);
+    return OK;
+}
+
+static int workers_new(struct worker *w, int threads, size_t scratch)
+{
+    int st = OK;
+    for (int t = 0; t < threads && st == OK; t++) {
+        st = stamp_work_new(&w[t].work);
+        w[t].scratch = malloc((3 * scratch + 1) * sizeof *w[t].scratch);
+        if (!w[t].scratch)
+            st = E_NOMEM;
+    }
+    return st;
+}
+
+/* Entries in drawing order, tallest stamp and largest area. */
+static size_t order(const struct plan *p, struct entry *e, int *tallest, size_t *largest)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < p->n; i++) {
+        const struct draw *d = &p->draw[i];
+        if (d->path == PATH_NONE)
+            continue;
+        e[n++] = (struct entry){d->y0 < 0 ? 0 : d->y0, (unsigned int)i};
+        *tallest = d->ny > *tallest ? d->ny : *tallest;
+        if ((size_t)d->nx * (size_t)d->ny > *largest)
+            *largest = (size_t)d->nx * (size_t)d->ny;
+    }
+    qsort(e, n, sizeof *e, by_row);
+    return n;
+}
+
+int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar)
+{
+    if (im->nx != p->view.nx || im->ny != p->view.ny || threads < 1 || threads > 256 || p->n > UINT_MAX)
+        return E_RANGE;
+    int tallest = 1;
+    size_t largest = BATCH_PIXELS;
+    struct entry *e = malloc((p->n + 1) * sizeof *e);
+    struct worker *workers = calloc((size_t)threads, sizeof *workers);
+    double **stamp = malloc((BATCH_PIXELS / 16 + 1) * sizeof *stamp);
+    size_t n = e ? order(p, e, &tallest, &largest) : 0;
+    struct window w = {.im = im, .height = tallest > im->ny ? (int)im->ny : tallest};
+    w.row = calloc((size_t)w.height * (size_t)im->nx, sizeof *w.row);
+    double *space = fft_alloc((largest + 8) * sizeof *space);
+    struct job job = {.p = p, .stamp = stamp, .worker = workers, .bar = bar};
+
+    int st = e && workers && stamp && w.row && space ? workers_new(workers, threads, plan_scratch(p)) : E_NOMEM;
+    if (st == OK)
+        st = run(p, n, e, &w, &job, space, threads);
+    for (int t = 0; workers && t < threads; t++) {
+        stamp_work_free(workers[t].work);
+        free(workers[t].scratch);
+    }
+    free(e);
+    free(workers);
+    free(stamp);
+    free(w.row);
+    fft_free(space);
+    return st;
+}

@@ -1,0 +1,22 @@
+/*
+ * render.h - sums the stamps of a plan into an image of expected electrons.
+ *
+ * Stamps are made in parallel in batches and added in one fixed order, in
+ * double precision, to a window of rows that slides up the image: the same bytes
+ * for any number of threads.
+ */
+#ifndef PIXSHEAR_RENDER_H
+#define PIXSHEAR_RENDER_H
+
+#include "err.h"
+#include "image.h"
+#include "plan.h"
+#include "progress.h"
+
+/* Write every pixel of im (of the view's size). bar may be NULL. */
+MUST_CHECK int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar);
+
+/* Object i alone, in double: stamp of draw[i].nx x draw[i].ny (fft_alloc'ed by the caller). */
+MUST_CHECK int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out);
+
+#endif

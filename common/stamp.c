@@ -1,0 +1,575 @@
+/*
+ * stamp.c - one object on one stamp of pixels: Fourier space with exact alias
+ * folding when there is a PSF, pixel integrals when there is none.
+ *
+ * The Fourier path works on a quarter plane of real sums: even n1 + n2 give
+ * the real part of the transform, odd ones the imaginary part, and
+ * phi_n(-k) = (-1)^n phi_n(k) gives the rows -u_y from the rows u_y.
+ */
+#include "stamp.h"
+#include "shapelet.h"
+#include "shear.h"
+#include "simd.h"
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TWO_PI 6.283185307179586476925287
+#define LANES 8
+
+/* Eight doubles; the compiler splits them to what the processor has. Loads need no alignment. */
+typedef double v8 __attribute__((vector_size(64), aligned(8)));
+
+struct stamp_work {
+    double *mem;           /* arena of `cap` doubles */
+    size_t cap, used;
+    double *freq;          /* n x (n/2+1) complex */
+    size_t freq_cap;
+};
+
+int stamp_work_new(struct stamp_work **w)
+{
+    *w = calloc(1, sizeof **w);
+    return *w ? OK : E_NOMEM;
+}
+
+void stamp_work_free(struct stamp_work *w)
+{
+    if (!w)
+        return;
+    free(w->mem);
+    fft_free(w->freq);
+    free(w);
+}
+
+static size_t round8(size_t n)
+{
+    return (n + LANES - 1) / LANES * LANES;
+}
+
+/* Make the arena hold `doubles` and forget what it held. */
+static int arena_reset(struct stamp_work *w, size_t doubles)
+{
+    w->used = 0;
+    if (doubles <= w->cap)
+        return OK;
+    double *p = aligned_alloc(64, round8(doubles) * sizeof *p);
+    if (!p)
+        return E_NOMEM;
+    free(w->mem);
+    w->mem = p;
+    w->cap = round8(doubles);
+    return OK;
+}
+
+/* The next n doubles of the arena; arena_reset was asked for enough. */
+static double *arena_take(struct stamp_work *w, size_t n)
+{
+    double *p = w->mem + w->used;
+    w->used += round8(n);
+    return p;
+}
+
+static int freq_need(struct stamp_work *w, size_t doubles)
+{
+    if (doubles <= w->freq_cap)
+        return OK;
+    double *p = fft_alloc(doubles * sizeof *p);
+    if (!p)
+        return E_NOMEM;
+    fft_free(w->freq);
+    w->freq = p;
+    w->freq_cap = doubles;
+    return OK;
+}
+
+/* ---- transfer function ---- */
+
+static int last_frequency(double ucut, double pixel, int n)
+{
+    return (int)floor(ucut * pixel * n * (1 + 1e-12));
+}
+
+double stamp_grid_bytes(double ucut, double pixel, int n, int complex_t)
+{
+    double k = floor(ucut * pixel * n) + 1;
+    return (complex_t ? 2 : 1) * 8.0 * 2 * k * (k + LANES);
+}
+
+/* Multiply rows and columns of the table by the one-dimensional factors f. */
+static void apply_factors(struct stamp_grid *g, const double *f)
+{
+    for (int row = 0; row <= 2 * g->kmax; row++) {
+        double fy = f[abs(row - g->kmax)];
+        double *re = g->t_re + (size_t)row * (size_t)g->ld;
+        double *im = g->t_im ? g->t_im + (size_t)row * (size_t)g->ld : NULL;
+        for (int i = 0; i <= g->kmax; i++) {
+            re[i] *= fy * f[i];
+            if (im)
+                im[i] *= fy * f[i];
+        }
+    }
+}
+
+/* Fill t_re, t_im from the PSF's table; u holds the 2 kmax + 1 frequencies from -kmax du. */
+static int tabulate(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double *u,
+                    double *re, double *im, double *f)
+{
+    const int k = g->kmax;
+    for (int i = -k; i <= k; i++)
+        u[i + k] = i * g->du;
+    int st = otf_grid(t, k + 1, u + k, 2 * k + 1, u, re, im);
+    if (st)
+        return st;
+    for (int row = 0; row <= 2 * k; row++) {
+        memcpy(g->t_re + (size_t)row * (size_t)g->ld, re + (size_t)row * (size_t)(k + 1),
+               (size_t)(k + 1) * sizeof *re);
+        if (g->t_im)
+            memcpy(g->t_im + (size_t)row * (size_t)g->ld, im + (size_t)row * (size_t)(k + 1),
+                   (size_t)(k + 1) * sizeof *im);
+    }
+    for (int i = 0; i <= k; i++)
+        f[i] = 1;
+    if (r->diffusion > 0)
+        otf_diffusion(k + 1, u + k, r->diffusion, f);
+    if (r->box > 0)
+        otf_box(k + 1, u + k, r->box, f);
+    if (r->diffusion > 0 || r->box > 0)
+        apply_factors(g, f);
+    return OK;
+}
+
+int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double pixel,
+                   int n)
+{
+    if (n < 4 || n > 4096 || n % 2 || !(pixel > 0) || !(t->ucut > 0) || !(t->ucut * pixel < 64) ||
+        !(r->diffusion >= 0) || !(r->box >= 0))
+        return E_RANGE;
+    struct stamp_grid s = {.n = n, .pixel = pixel, .du = 1 / (n * pixel)};
+    s.kmax = last_frequency(t->ucut, pixel, n);
+    s.ld = (int)round8((size_t)s.kmax + 1);
+    size_t rows = 2 * (size_t)s.kmax + 1, cols = (size_t)s.kmax + 1;
+    double *tmp = malloc((2 * rows * cols + rows + cols) * sizeof *tmp);
+    s.t_re = calloc(rows * (size_t)s.ld, sizeof *s.t_re);
+    const int real = otf_is_real(t);
+    s.t_im = real ? NULL : calloc(rows * (size_t)s.ld, sizeof *s.t_im);
+    int st = !tmp || !s.t_re || (!real && !s.t_im) ? E_NOMEM : OK;
+    if (st == OK)
+        st = tabulate(&s, t, r, tmp + 2 * rows * cols, tmp, tmp + rows * cols, tmp + 2 * rows * cols + rows);
+    if (st == OK)
+        st = fft_plan_c2r(&s.fft, n, n);
+    free(tmp);
+    if (st) {
+        free(s.t_re);
+        free(s.t_im);
+        return st;
+    }
+    *g = s;
+    return OK;
+}
+
+void stamp_grid_free(struct stamp_grid *g)
+{
+    free(g->t_re);
+    free(g->t_im);
+    if (g->fft)
+        fft_done(g->fft);
+    *g = (struct stamp_grid){0};
+}
+
+/* ---- Fourier path ---- */
+
+/* re + i im of exp(-2 pi i k s / n), k = 0..m-1, by eight chains (error 1e-16 m/8); m rounded up to 8. */
+WIDE static void phases(int m, double s, int n, double *re, double *im)
+{
+    for (int k = 0; k < LANES; k++) {
+        double a = -TWO_PI * k * (s / n);
+        re[k] = cos(a);
+        im[k] = sin(a);
+    }
+    double a8 = -TWO_PI * LANES * (s / n), c = cos(a8), d = sin(a8);
+    for (int k = LANES; k < m; k += LANES) {
+        v8 r = *(v8 *)(re + k - LANES), i = *(v8 *)(im + k - LANES);
+        *(v8 *)(re + k) = r * c - i * d;
+        *(v8 *)(im + k) = r * d + i * c;
+    }
+}
+
+/* One row of the transform at +u_y (p) and -u_y (m): columns 0..m-1. */
+struct row {
+    double *p_re, *p_im, *m_re, *m_im;
+};
+
+/* Everything the rows of one object need. */
+struct transform {
+    const struct stamp_grid *g;
+    const struct shape *s;
+    int nmax, ld;              /* ld: columns, a multiple of 8 */
+    double *phi;               /* (nmax+1) x ld basis at u_x >= 0 */
+    double *phi_y;             /* the same along y (phi itself when the axes are alike) */
+    double *ve, *vo;           /* (nmax+1) x ld sums over even and odd n1, for each n2 */
+    double *coef;              /* coefficients with the factors (-i)^n taken out */
+    double *arg;               /* ld abscissae of a mapped row */
+    double u[3];               /* mapped: (u0 kx + u1 ky, u2 ky) */
+    double *p_re, *p_im, *y_re, *y_im;   /* phases along x and y */
+    double *acc[4];            /* folded rows */
+};
+
+/* c (-i)^(n1+n2) as a real number that belongs to the real (n even) or imaginary part (n odd). */
+static void take_phase_out(int nmax, const double *c, double *out)
+{
+    static const double sign[4] = {1, -1, -1, 1};
+    size_t i = 0;
+    for (int n = 0; n <= nmax; n++)
+        for (int n1 = 0; n1 <= n; n1++, i++)
+            out[i] = sign[n & 3] * c[i];
+}
+
+/* ve[n2], vo[n2] = sums over even, odd n1 of coef phi_n1(k_x). */
+WIDE static void sum_over_n1(int nmax, int ld, int m, const double *coef, const double *phi, double *ve, double *vo)
+{
+    for (int n2 = 0; n2 <= nmax; n2++)
+        for (int odd = 0; odd < 2; odd++) {
+            double *v = (odd ? vo : ve) + (size_t)n2 * (size_t)ld;
+            for (int k = 0; k < m; k += LANES) {
+                v8 sum = {0};
+                for (int n1 = odd; n1 <= nmax - n2; n1 += 2) {
+                    int n = n1 + n2;
+                    sum += coef[n * (n + 1) / 2 + n1] * *(const v8 *)(phi + (size_t)n1 * (size_t)ld + k);
+                }
+                *(v8 *)(v + k) = sum;
+            }
+        }
+}
+
+/* Rows +-u_y: f points at phi_n2(k_y), n2 rising with stride ld. */
+WIDE static void row_separable(int nmax, int ld, int m, const double *f, const double *ve, const double *vo,
+                               const struct row *r)
+{
+    for (int k = 0; k < m; k += LANES) {
+        v8 ee = {0}, oe = {0}, oo = {0}, eo = {0};
+        for (int n2 = 0; n2 <= nmax; n2 += 2) {
+            double y = f[(size_t)n2 * (size_t)ld];
+            ee += y * *(const v8 *)(ve + (size_t)n2 * (size_t)ld + k);
+            oe += y * *(const v8 *)(vo + (size_t)n2 * (size_t)ld + k);
+        }
+        for (int n2 = 1; n2 <= nmax; n2 += 2) {
+            double y = f[(size_t)n2 * (size_t)ld];
+            eo += y * *(const v8 *)(ve + (size_t)n2 * (size_t)ld + k);
+            oo += y * *(const v8 *)(vo + (size_t)n2 * (size_t)ld + k);
+        }
+        *(v8 *)(r->p_re + k) = ee + oo;
+        *(v8 *)(r->m_re + k) = ee - oo;
+        *(v8 *)(r->p_im + k) = oe + eo;
+        *(v8 *)(r->m_im + k) = oe - eo;
+    }
+}
+
+/* Row at u_y = ky du of a mapped object, from phi_n1 at its own abscissae. */
+static int row_mapped(const struct transform *t, int ky, int m, double *re, double *im)
+{
+    const int nmax = t->nmax, ld = t->ld;
+    const double b = TWO_PI * t->s->beta_x * t->g->du;
+    double y = b * t->u[2] * ky, fy[SHAPELET_NMAX + 1], even[SHAPELET_NMAX + 1], odd[SHAPELET_NMAX + 1];
+    int st = shapelet_basis(nmax, 1, 1, &y, fy);
+    if (st)
+        return st;
+    for (int n1 = 0; n1 <= nmax; n1++) {
+        double s[2] = {0, 0};
+        for (int n2 = 0; n2 <= nmax - n1; n2++)
+            s[(n1 + n2) & 1] += t->coef[shapelet_index(n1, n2)] * fy[n2];
+        even[n1] = s[0];
+        odd[n1] = s[1];
+    }
+    for (int i = 0; i < m; i++)
+        t->arg[i] = b * (t->u[0] * i + t->u[1] * ky);
+    st = shapelet_basis(nmax, 1, m, t->arg, t->phi);
+    memset(re, 0, (size_t)ld * sizeof *re);
+    memset(im, 0, (size_t)ld * sizeof *im);
+    for (int n1 = 0; n1 <= nmax && st == OK; n1++) {
+        const double *f = t->phi + (size_t)n1 * (size_t)m;
+        for (int i = 0; i < m; i++) {
+            re[i] += even[n1] * f[i];
+            im[i] += odd[n1] * f[i];
+        }
+    }
+    return st;
+}
+
+/* Row times transfer function times phase along x, in place. */
+WIDE static void row_transfer(int m, const double *t_re, const double *t_im, const double *c, const double *d,
+                              double *re, double *im)
+{
+    for (int k = 0; k < m; k += LANES) {
+        v8 a = *(v8 *)(re + k), b = *(v8 *)(im + k), x = *(const v8 *)(c + k), y = *(const v8 *)(d + k);
+        v8 t = *(const v8 *)(t_re + k);
+        v8 u = a * t, v = b * t;
+        if (t_im) {
+            v8 s = *(const v8 *)(t_im + k);
+            u -= b * s;
+            v += a * s;
+        }
+        *(v8 *)(re + k) = u * x - v * y;
+        *(v8 *)(im + k) = u * y + v * x;
+    }
+}
+
+/* Add columns 0..m-1 of a half-plane row to the folded row `d` and, conjugated, to `c` (columns 0..n/2). */
+WIDE static void row_fold(int n, int m, const double *re, const double *im, double *d_re, double *d_im,
+                          double *c_re, double *c_im)
+{
+    const int h = n / 2;
+    for (int k = 0; k < m; k += n) {
+        int last = m - 1 - k < h ? m - 1 - k : h;
+        for (int j = 0; j <= last; j++) {
+            d_re[j] += re[k + j];
+            d_im[j] += im[k + j];
+        }
+    }
+    for (int k = n; k - h < m; k += n) {
+        int first = k > m - 1 ? k - (m - 1) : 0;
+        for (int j = first; j <= h; j++) {
+            c_re[j] += re[k - j];
+            c_im[j] -= im[k - j];
+        }
+    }
+}
+
+/* out (complex) += (a + i b) (c + i d), columns 0..h. */
+WIDE static void row_add(int h, const double *a, const double *b, double c, double d, double *out)
+{
+    for (int j = 0; j <= h; j++) {
+        out[2 * j] += a[j] * c - b[j] * d;
+        out[2 * j + 1] += a[j] * d + b[j] * c;
+    }
+}
+
+/* U of A' = R U (R a rotation by rho), A' = {a, b, c, d} = rows. */
+static double upper_triangle(double a, double b, double c, double d, double u[3])
+{
+    double l = hypot(a, c), co = a / l, si = c / l;
+    u[0] = l;
+    u[1] = co * b + si * d;
+    u[2] = co * d - si * b;
+    return atan2(si, co);
+}
+
+/* Basis along an axis: phi_n(2 pi beta du k), k = 0..ld-1. */
+static int axis_basis(const struct transform *t, double beta, double *x, double *phi)
+{
+    for (int k = 0; k < t->ld; k++)
+        x[k] = TWO_PI * beta * t->g->du * k;
+    return shapelet_basis(t->nmax, 1, t->ld, x, phi);
+}
+
+/* Lay out scratch memory and compute what does not depend on the row. */
+static int transform_start(struct transform *t, struct stamp_work *w, const struct stamp_grid *g,
+                           const struct shape *s, int columns)
+{
+    t->g = g;
+    t->s = s;
+    t->nmax = s->coef ? s->nmax : -1;
+    t->ld = (int)round8((size_t)columns);
+    const size_t ld = (size_t)t->ld, h = round8((size_t)g->n / 2 + 1), orders = (size_t)(t->nmax + 1);
+    const size_t nc = s->coef ? shapelet_count(s->nmax) : 0;
+    int st = arena_reset(w, 4 * orders * ld + 9 * ld + 4 * h + 2 * round8(nc));
+    if (st)
+        return st;
+    t->phi = arena_take(w, orders * ld);
+    t->phi_y = t->phi;
+    t->ve = arena_take(w, orders * ld);
+    t->vo = arena_take(w, orders * ld);
+    t->arg = arena_take(w, ld);
+    t->p_re = arena_take(w, ld);
+    t->p_im = arena_take(w, ld);
+    t->y_re = arena_take(w, ld);
+    t->y_im = arena_take(w, ld);
+    for (int i = 0; i < 4; i++)
+        t->acc[i] = arena_take(w, h);
+    if (!s->coef)
+        return OK;
+    t->coef = arena_take(w, nc);
+    if (s->mapped) {
+        double *rotated = arena_take(w, nc);
+        double rho = upper_triangle(s->a[0], s->a[2], s->a[1], s->a[3], t->u);
+        st = shapelet_rotate(s->nmax, -rho, s->coef, rotated);
+        take_phase_out(s->nmax, rotated, t->coef);
+        return st;
+    }
+    take_phase_out(s->nmax, s->coef, t->coef);
+    st = axis_basis(t, s->beta_x, t->arg, t->phi);
+    if (st == OK && s->beta_y != s->beta_x) {
+        t->phi_y = arena_take(w, orders * ld);
+        st = axis_basis(t, s->beta_y, t->arg, t->phi_y);
+    }
+    if (st == OK)
+        sum_over_n1(t->nmax, t->ld, t->ld, t->coef, t->phi, t->ve, t->vo);
+    return st;
+}
+
+/* The object's transform on rows +-ky, columns 0..m-1. */
+static int transform_row(const struct transform *t, int ky, int m, const struct row *r)
+{
+    if (!t->s->coef) {
+        for (int k = 0; k < m; k++) {
+            r->p_re[k] = r->m_re[k] = 1;
+            r->p_im[k] = r->m_im[k] = 0;
+        }
+        return OK;
+    }
+    if (!t->s->mapped) {
+        row_separable(t->nmax, t->ld, m, t->phi_y + ky, t->ve, t->vo, r);
+        return OK;
+    }
+    int st = row_mapped(t, ky, m, r->p_re, r->p_im);
+    return st ? st : row_mapped(t, -ky, m, r->m_re, r->m_im);
+}
+
+/* All rows: transform, transfer function, phases, aliases; into freq. */
+static int fold_rows(const struct transform *t, double kcut, double scale, const struct row *r, double *freq)
+{
+    const struct stamp_grid *g = t->g;
+    const int n = g->n, h = n / 2;
+    const size_t bytes = ((size_t)h + 1) * sizeof(double);
+    const int top = kcut < g->kmax ? (int)kcut : g->kmax;
+    for (int ky = 0; ky <= top; ky++) {
+        double reach = sqrt(kcut * kcut - (double)ky * ky);
+        int m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
+        int st = transform_row(t, ky, m, r);
+        if (st)
+            return st;
+        size_t up = (size_t)(g->kmax + ky) * (size_t)g->ld, down = (size_t)(g->kmax - ky) * (size_t)g->ld;
+        row_transfer(m, g->t_re + up, g->t_im ? g->t_im + up : NULL, t->p_re, t->p_im, r->p_re, r->p_im);
+        row_transfer(m, g->t_re + down, g->t_im ? g->t_im + down : NULL, t->p_re, t->p_im, r->m_re, r->m_im);
+        for (int i = 0; i < 4; i++)
+            memset(t->acc[i], 0, bytes);
+        row_fold(n, m, r->p_re, r->p_im, t->acc[0], t->acc[1], t->acc[2], t->acc[3]);
+        row_fold(n, m, r->m_re, r->m_im, t->acc[2], t->acc[3], t->acc[0], t->acc[1]);
+        size_t row = (size_t)(ky % n);
+        double c = scale * t->y_re[ky], d = scale * t->y_im[ky];
+        row_add(h, t->acc[0], t->acc[1], c, d, freq + row * 2 * ((size_t)h + 1));
+        if (ky > 0)
+            row_add(h, t->acc[2], t->acc[3], c, -d, freq + (((size_t)n - row) % (size_t)n) * 2 * ((size_t)h + 1));
+    }
+    return OK;
+}
+
+int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y,
+                  double flux, double kcut, double *out)
+{
+    if (!(kcut >= 0) || !isfinite(x) || !isfinite(y) || !isfinite(flux) ||
+        (s->coef && (s->nmax < 0 || s->nmax > SHAPELET_NMAX || !(s->beta_x > 0) || !(s->beta_y > 0))))
+        return E_RANGE;
+    const int columns = 1 + (kcut < g->kmax ? (int)kcut : g->kmax);
+    const size_t nfreq = (size_t)g->n * 2 * ((size_t)g->n / 2 + 1);
+    const size_t ld = round8((size_t)columns);
+    struct transform t = {0};
+    int st = freq_need(w, nfreq + 4 * ld);
+    if (st == OK)
+        st = transform_start(&t, w, g, s, columns);
+    if (st)
+        return st;
+    phases(t.ld, x, g->n, t.p_re, t.p_im);
+    phases(t.ld, y, g->n, t.y_re, t.y_im);
+    double *rows = w->freq + nfreq;
+    const struct row r = {rows, rows + ld, rows + 2 * ld, rows + 3 * ld};
+    memset(w->freq, 0, nfreq * sizeof *w->freq);
+    double scale = flux / ((double)g->n * g->n);
+    if (s->coef)
+        scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
+    st = fold_rows(&t, kcut, scale, &r, w->freq);
+    if (st == OK)
+        fft_run(g->fft, w->freq, out);
+    return st;
+}
+
+/* ---- without a PSF ---- */
+
+/* Pixel integrals or centre values along one axis, (nmax+1) x m; edge: m + 1 doubles of scratch. */
+static int axis_pixels(int nmax, double beta, double pixel, double box, int m, double origin, double *edge,
+                       double *b)
+{
+    if (box > 0) {
+        for (int i = 0; i <= m; i++)
+            edge[i] = (i - 0.5 - origin) * pixel;
+        return shapelet_pixel(nmax, beta, m, edge, b);
+    }
+    for (int i = 0; i < m; i++)
+        edge[i] = (i - origin) * pixel;
+    int st = shapelet_basis(nmax, beta, m, edge, b);
+    for (size_t i = 0; st == OK && i < (size_t)m * (size_t)(nmax + 1); i++)
+        b[i] *= pixel;
+    return st;
+}
+
+int stamp_closed(struct stamp_work *w, const struct shape *s, double pixel, double box, int nx, int ny,
+                 double x, double y, double flux, double *out)
+{
+    if (!s->coef || s->mapped || nx < 1 || ny < 1 || !(pixel > 0) || !isfinite(x) || !isfinite(y) ||
+        !isfinite(flux) || (box > 0 && box != pixel))
+        return E_RANGE;
+    const size_t orders = (size_t)s->nmax + 1, m = (size_t)(nx > ny ? nx : ny);
+    int st = arena_reset(w, 2 * round8(orders * m) + round8(m + 1));
+    if (st)
+        return st;
+    double *edge = arena_take(w, m + 1);
+    double *bx = arena_take(w, orders * m), *by = arena_take(w, orders * m);
+    st = axis_pixels(s->nmax, s->beta_x, pixel, box, nx, x, edge, bx);
+    if (st == OK)
+        st = axis_pixels(s->nmax, s->beta_y, pixel, box, ny, y, edge, by);
+    if (st == OK)
+        st = shapelet_pixel_sum(s->nmax, s->coef, nx, bx, ny, by, out);
+    for (size_t i = 0; st == OK && i < (size_t)nx * (size_t)ny; i++)
+        out[i] *= flux;
+    return st;
+}
+
+int stamp_mapped(struct stamp_work *w, const struct shape *s, double pixel, double box, int nx, int ny, double x,
+                 double y, double flux, double *out)
+{
+    if (!s->coef || s->beta_x != s->beta_y || nx < 1 || ny < 1 || !(pixel > 0) || !isfinite(x) || !isfinite(y) ||
+        !isfinite(flux) || (box > 0 && box != pixel))
+        return E_RANGE;
+    int st = arena_reset(w, round8((size_t)nx + 1) + round8((size_t)ny + 1));
+    if (st)
+        return st;
+    double *ex = arena_take(w, (size_t)nx + 1), *ey = arena_take(w, (size_t)ny + 1);
+    const double *a = s->a, half = box > 0 ? 0.5 : 0;
+    const double inverse[4] = {a[3], -a[1], -a[2], a[0]};   /* det A = 1 */
+    for (int i = 0; i <= nx; i++)
+        ex[i] = (i - half - x) * pixel;
+    for (int j = 0; j <= ny; j++)
+        ey[j] = (j - half - y) * pixel;
+    if (box > 0)
+        st = shear_pixels(s->nmax, s->beta_x, s->coef, inverse, nx, ex, ny, ey, out);
+    else
+        st = shear_grid(s->nmax, s->beta_x, s->coef, inverse, nx, ex, ny, ey, out, NULL);
+    const double scale = box > 0 ? flux : flux * pixel * pixel;
+    for (size_t i = 0; st == OK && i < (size_t)nx * (size_t)ny; i++)
+        out[i] *= scale;
+    return st;
+}
+
+/* Pixels and shares of a coordinate: one pixel, or two at an edge. */
+static int point_axis(double x, double share[2])
+{
+    double i = floor(x + 0.5);
+    int edge = x + 0.5 == i;
+    share[0] = edge ? 0.5 : 1;
+    share[1] = edge ? 0.5 : 0;
+    return (int)i - edge;
+}
+
+void stamp_point(int nx, int ny, double x, double y, double flux, double *out)
+{
+    double sx[2], sy[2];
+    memset(out, 0, (size_t)nx * (size_t)ny * sizeof *out);
+    if (!(x > -1 && y > -1 && x < nx && y < ny))
+        return;
+    int i0 = point_axis(x, sx), j0 = point_axis(y, sy);
+    for (int j = 0; j < 2; j++)
+        for (int i = 0; i < 2; i++)
+            if (i0 + i >= 0 && i0 + i < nx && j0 + j >= 0 && j0 + j < ny)
+                out[(size_t)(j0 + j) * (size_t)nx + (size_t)(i0 + i)] += flux * sx[i] * sy[j];
+}

@@ -1,0 +1,98 @@
+/*
+ * stamp.h - one object on one stamp of pixels.
+ *
+ * With a PSF, in Fourier space (u in cycles/arcsec):
+ *
+ *   pixel(i) = flux theta^2 int F(u) T(u) exp(2 pi i u.(x_i - x_0)) d2u
+ *
+ * F the transform of the object, T that of PSF, charge diffusion and pixel.  T
+ * vanishes beyond a cut-off, so on a grid of 1/(N theta) the sum over all
+ * frequencies is finite: bands beyond the pixel grid's Nyquist frequency are
+ * added onto the grid (exact aliasing), then one real transform is made.  Only
+ * the periodicity of N theta is left as an error.
+ *
+ * Without a PSF, closed-form integrals of the basis over pixels, or closed form
+ * along y and Gauss-Legendre nodes along x when the object's axes do not allow it.
+ *
+ * No function here draws, reads or prints; stamps are doubles, rows of y.
+ */
+#ifndef PIXSHEAR_STAMP_H
+#define PIXSHEAR_STAMP_H
+
+#include "err.h"
+#include "fft.h"
+#include "otf.h"
+#include <stddef.h>
+
+/*
+ * Surface brightness sum c_n1n2 B_n1(x;beta_x) B_n2(y;beta_y), arcsec, after
+ * the map x -> A x with A = {a11, a12, a21, a22}, det A = 1.  A point has
+ * coef NULL.  With beta_x = beta_y = beta and A = 1 it is a plain shapelet.
+ */
+struct shape {
+    int nmax;
+    double beta_x, beta_y;
+    const double *coef;
+    int mapped;            /* a holds a map that is not the identity */
+    double a[4];
+};
+
+/* ---- with a PSF ---- */
+
+/* What all stamps of one side share. */
+struct stamp_grid {
+    int n;                 /* pixels per side, even */
+    int kmax;              /* frequencies -kmax..kmax per axis, du apart */
+    int ld;                /* row length of t_re, t_im: kmax + 1 rounded up to 8 */
+    double du;             /* cycles/arcsec */
+    double pixel;          /* arcsec */
+    double *t_re, *t_im;   /* (2 kmax + 1) x ld: rows u_y = -kmax du .., columns u_x >= 0; t_im NULL: real */
+    struct fft *fft;
+};
+
+/* Factors of the transfer function beyond the PSF, arcsec; 0 leaves the factor out. */
+struct stamp_response {
+    double diffusion;      /* sigma of a Gaussian */
+    double box;            /* side of the square pixel */
+};
+
+/* Tabulate; n even, 4..4096. E_RANGE, E_NOMEM. */
+MUST_CHECK int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r,
+                              double pixel, int n);
+void stamp_grid_free(struct stamp_grid *g);
+/* Bytes that stamp_grid_new takes. */
+double stamp_grid_bytes(double ucut, double pixel, int n, int complex_t);
+
+/* Scratch memory of one thread, grown when needed. */
+struct stamp_work;
+MUST_CHECK int stamp_work_new(struct stamp_work **w);
+void stamp_work_free(struct stamp_work *w);
+
+/*
+ * Object with its origin at (x, y) in pixels of the stamp (centre of the first
+ * pixel is 0); flux in electrons; frequencies |u| <= kcut du are used.
+ * out: n x n from fft_alloc, overwritten.
+ */
+MUST_CHECK int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s,
+                             double x, double y, double flux, double kcut, double *out);
+
+/* ---- without a PSF ---- */
+
+/*
+ * Pixel integrals (box = pixel) or, with box = 0, values times pixel^2 at pixel
+ * centres.  s->mapped must be 0: closed form, 1e-14 of the peak.  nx x ny pixels.
+ */
+MUST_CHECK int stamp_closed(struct stamp_work *w, const struct shape *s, double pixel, double box, int nx,
+                            int ny, double x, double y, double flux, double *out);
+
+/* The same for any map A: closed form in y, Gauss-Legendre nodes in x (shear_pixels). nmax <= 66. */
+MUST_CHECK int stamp_mapped(struct stamp_work *w, const struct shape *s, double pixel, double box, int nx,
+                            int ny, double x, double y, double flux, double *out);
+
+/*
+ * A point without a PSF: all flux in the pixel that holds it; on an edge half to either side, on a
+ * corner a quarter each.
+ */
+void stamp_point(int nx, int ny, double x, double y, double flux, double *out);
+
+#endif

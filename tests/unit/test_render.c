@@ -1,0 +1,349 @@
+/*
+ * test_render.c - scenes: error requested against error found (stamps four times
+ * larger, all frequencies, exact shear), same bytes for any number of threads,
+ * paths that make no transform, and objects in strange places.
+ */
+#include "check.h"
+#include "fft.h"
+#include "pupil.h"
+#include "render.h"
+#include "rng.h"
+#include "shapelet.h"
+#include "shear.h"
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+static double uniform(int i, int k)
+{
+    const struct rng r = rng_stream(5, 0, RNG_TEST);
+    return rng_uniform(&r, (uint64_t)i, (uint32_t)k);
+}
+
+/* The default telescope: 2 m, obscuration 0.3, three vanes, 820 nm. */
+static void telescope(struct otf *t)
+{
+    struct pupil p = telescope_preset(0)->pupil;
+    struct err e = {""};
+    if (pupil_otf(&p, 128, t, &e)) {
+        printf("not ok - %s\n", e.text);
+        exit(1);
+    }
+    if (!t->sre && otf_spline(t))
+        exit(1);
+}
+
+/* n galaxies with counts, sizes and orders like those of deep fields, and every tenth a star. */
+static struct emitter *field(int n, long side)
+{
+    struct emitter *s = calloc((size_t)n, sizeof *s);
+    for (int i = 0; i < n; i++) {
+        double mag = fmax(20, 30.8 + log10(uniform(i, 0)) / 0.2), m[6];
+        int nmax = mag < 24 ? 15 : mag < 26 ? 12 : mag < 28 ? 8 : 4;
+        double beta = 0.2 * pow(10, -0.105 * (mag - 22.25)) * exp(0.9 * (uniform(i, 1) - 0.5));
+        double *c = malloc(shapelet_count(nmax) * sizeof *c);
+        for (int k = 0, j = 0; k <= nmax; k++)
+            for (int n1 = 0; n1 <= k; n1++, j++)
+                c[j] = j ? 1.2 * (uniform(i, 10 + j) - 0.5) / (1 + k) : 1;
+        shapelet_moments(nmax, beta, c, m);
+        for (size_t j = 0; j < shapelet_count(nmax); j++)
+            c[j] /= fmax(m[0], 0.3 * beta);
+        s[i] = (struct emitter){.x = uniform(i, 2) * (double)side, .y = uniform(i, 3) * (double)side,
+                                .flux = 2000 * pow(10, -0.4 * (mag - 26.65)), .coef = i % 10 ? c : NULL,
+                                .nmax = nmax, .parity = i % 2 ? 1 : -1, .beta = beta, .dilation = i % 7 ? 1 : 1.2,
+                                .rotation = i % 3 ? 0 : 6.3 * uniform(i, 4)};
+        if (i % 10 == 0)
+            free(c);
+        if (i % 11 == 3) {
+            s[i].g1 = 0.3 * (uniform(i, 5) - 0.5);
+            s[i].g2 = 0.3 * (uniform(i, 6) - 0.5);
+        }
+    }
+    return s;
+}
+
+static void field_free(struct emitter *s, int n)
+{
+    for (int i = 0; i < n; i++)
+        free((double *)(uintptr_t)s[i].coef);
+    free(s);
+}
+
+/* Exact map of one object: coefficients after parity and rotation, and the product of both shears. */
+static int exact_shape(const struct view *v, const struct emitter *s, double *tmp, double *c, struct shape *shape)
+{
+    double own[4], all[4];
+    *shape = (struct shape){.nmax = s->nmax, .beta_x = s->beta * s->dilation, .beta_y = s->beta * s->dilation};
+    if (!s->coef)
+        return OK;
+    for (size_t i = 0; i < shapelet_count(s->nmax); i++)
+        tmp[i] = s->coef[i] / s->dilation;
+    if (s->parity < 0)
+        shapelet_mirror(s->nmax, tmp);
+    int st = shapelet_rotate(s->nmax, s->rotation, tmp, c);
+    if (!st)
+        st = shear_matrix(s->g1, s->g2, own);
+    if (!st)
+        st = shear_matrix(v->g1, v->g2, all);
+    shape->coef = c;
+    shape->mapped = 1;
+    shape->a[0] = all[0] * own[0] + all[1] * own[2];
+    shape->a[1] = all[0] * own[1] + all[1] * own[3];
+    shape->a[2] = all[2] * own[0] + all[3] * own[2];
+    shape->a[3] = all[2] * own[1] + all[3] * own[3];
+    return st;
+}
+
+struct result {
+    double median, worst, share;   /* of |error| / tolerance; share within the tolerance */
+};
+
+static int rising(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Worst pixel error of object i over the tolerance, against a stamp `wide` pixels across. */
+static double error_of(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, int wide, double *big,
+                       double *small)
+{
+    const struct view *v = &p->view;
+    const struct draw *d = &p->draw[i];
+    struct shape shape;
+    static double tmp[200], c[200];
+    const int shift = (wide - d->nx) / 2;
+    if (scene_stamp(p, i, w, scratch, small) || exact_shape(v, &p->emitter[i], tmp, c, &shape))
+        return NAN;
+    const double x = p->emitter[i].x - d->x0 + shift, y = p->emitter[i].y - d->y0 + shift;
+    int st = OK, height = wide;
+    if (v->psf) {
+        struct stamp_grid g;
+        const struct stamp_response r = {v->diffusion, v->pixel};
+        st = stamp_grid_new(&g, v->psf, &r, v->pixel, wide);
+        if (!st)
+            st = stamp_fourier(&g, w, &shape, x, y, p->emitter[i].flux, 1e9, big);
+        stamp_grid_free(&g);
+    } else if (shape.coef) {
+        st = stamp_mapped(w, &shape, v->pixel, v->pixel, wide, wide, x, y, p->emitter[i].flux, big);
+    } else {
+        stamp_point(wide, wide, x, y, p->emitter[i].flux, big);
+    }
+    if (st)
+        return NAN;
+    double peak = 0, worst = 0;
+    for (int k = 0; k < wide * height; k++)
+        peak = fmax(peak, fabs(big[k]));
+    for (int j = 0; j < height; j++)
+        for (int k = 0; k < wide; k++) {
+            int a = k - shift, b = j - shift;
+            int in = a >= 0 && b >= 0 && a < d->nx && b < d->ny;
+            worst = fmax(worst, fabs(big[j * wide + k] - (in ? small[b * d->nx + a] : 0)));
+        }
+    return worst / fmax(p->acc.eps * peak, p->acc.floor);
+}
+
+static struct result requested(const struct view *v, double eps, double floor, int n, const struct emitter *s)
+{
+    struct accuracy a = ACCURACY_DEFAULT;
+    struct plan p;
+    struct stamp_work *w;
+    struct result r = {NAN, NAN, 0};
+    a.eps = eps;
+    a.floor = floor;
+    if (scene_plan(&p, v, &a, (size_t)n, s) || stamp_work_new(&w))
+        return r;
+    double *scratch = malloc((3 * plan_scratch(&p) + 1) * sizeof *scratch), *e = malloc((size_t)n * sizeof *e);
+    const size_t room = 2304u * 2304u;
+    double *big = fft_alloc(room * sizeof *big), *small = fft_alloc(room / 4 * sizeof *small);
+    int m = 0, good = 0;
+    for (int i = 0; i < n; i++) {
+        const struct draw *d = &p.draw[i];
+        if (d->path == PATH_NONE)
+            continue;
+        int wide = v->psf ? (d->nx > 400 ? 2 : 4) * d->nx : 2 * d->nx + 9 + d->nx % 2;
+        wide = (v->psf || wide % 2 == d->nx % 2) ? wide : wide + 1;
+        if (!v->psf && (d->nx != d->ny || wide > 400))
+            continue;
+        e[m] = error_of(&p, (size_t)i, w, scratch, wide, big, small);
+        good += e[m] <= 1;
+        m += 1;
+    }
+    qsort(e, (size_t)m, sizeof *e, rising);
+    r = (struct result){e[m / 2], e[m - 1], (double)good / m};
+    for (int i = 0; i < m; i++)
+        if (!(e[i] == e[i]))
+            r.worst = NAN;
+    free(scratch);
+    free(e);
+    fft_free(big);
+    fft_free(small);
+    stamp_work_free(w);
+    plan_free(&p);
+    return r;
+}
+
+static void accuracy(const struct otf *t)
+{
+    static const struct { double pixel, eps, floor; int psf, n; } job[] = {
+        {0.10, 1e-2, 0, 1, 150}, {0.10, 1e-3, 0, 1, 150}, {0.10, 1e-4, 0, 1, 100}, {0.10, 1e-5, 0, 1, 40},
+        {0.10, 1e-7, 0.1, 1, 150}, {0.16, 1e-4, 0, 1, 60}, {0.05, 1e-3, 0, 1, 60}, {0.10, 1e-4, 0, 0, 100},
+        {0.10, 1e-8, 0, 0, 60}};
+    for (size_t i = 0; i < sizeof job / sizeof *job; i++) {
+        struct view v = {.nx = 300, .ny = 300, .pixel = job[i].pixel, .diffusion = job[i].psf ? 0.04 : 0,
+                         .psf = job[i].psf ? t : NULL, .g1 = 0.03, .g2 = 0.04};
+        struct emitter *s = field(job[i].n, 300);
+        struct result r = requested(&v, job[i].eps, job[i].floor, job[i].n, s);
+        check_that(r.share >= 0.99 && r.worst <= 3,
+                   "%s, %.2f\", accuracy %g, floor %g: error / tolerance median %.2g, worst %.2g, %.1f %% within",
+                   job[i].psf ? "PSF" : "no PSF", v.pixel, job[i].eps, job[i].floor, r.median, r.worst, 100 * r.share);
+        field_free(s, job[i].n);
+    }
+}
+
+/* Render; returns the image (owned by the caller) and what the plan was. */
+static struct image render(const struct view *v, double eps, int n, const struct emitter *s, int threads, struct plan *kept)
+{
+    struct accuracy a = ACCURACY_DEFAULT;
+    struct image im;
+    struct plan p;
+    a.eps = eps;
+    if (image_new(&im, v->nx, v->ny))
+        exit(1);
+    if (scene_plan(&p, v, &a, (size_t)n, s) || scene_render(&p, &im, threads, NULL))
+        for (size_t i = 0; i < image_count(&im); i++)
+            im.pix[i] = NAN;
+    if (kept)
+        *kept = p;
+    plan_free(&p);
+    return im;
+}
+
+static double sum_of(const struct image *im)
+{
+    double s = 0;
+    for (size_t i = 0; i < image_count(im); i++)
+        s += im->pix[i];
+    return s;
+}
+
+static void determinism(const struct otf *t)
+{
+    for (int psf = 0; psf < 2; psf++) {
+        struct view v = {.nx = 400, .ny = 300, .pixel = 0.1, .psf = psf ? t : NULL, .g1 = 0.03, .g2 = 0.04};
+        struct emitter *s = field(400, 400);
+        struct image a = render(&v, 1e-4, 400, s, 1, NULL), b = render(&v, 1e-4, 400, s, 2, NULL);
+        struct image c = render(&v, 1e-4, 400, s, 7, NULL);
+        size_t bytes = image_count(&a) * sizeof *a.pix;
+        check_that(sum_of(&a) > 0 && !memcmp(a.pix, b.pix, bytes) && !memcmp(a.pix, c.pix, bytes),
+                   "%s: 1, 2 and 7 threads give the same bytes", psf ? "PSF" : "no PSF");
+        image_free(&a);
+        image_free(&b);
+        image_free(&c);
+        field_free(s, 400);
+    }
+}
+
+/* What is not asked for is not made. */
+static void only_what_is_needed(const struct otf *t)
+{
+    struct view v = {.nx = 100, .ny = 100, .pixel = 0.1};
+    struct emitter *s = field(50, 100);
+    struct plan p;
+    struct image im = render(&v, 1e-4, 50, s, 1, &p);
+    check_that(p.fft_plans == 0 && p.n_matrix == 0 && p.count[PATH_FOURIER] == 0 && p.count[PATH_CLOSED] > 30,
+               "no PSF: no transform is planned, no shear: no matrix");
+    image_free(&im);
+    v.psf = t;
+    im = render(&v, 1e-4, 50, s, 1, &p);
+    check_that(p.fft_plans > 1 && p.count[PATH_CLOSED] == 0, "PSF: %zu transforms planned", p.fft_plans);
+    image_free(&im);
+    field_free(s, 50);
+}
+
+/* The series and the exact shear; the table of the reference for n = 2 at gamma = .1 is 1.1e-4 in L2. */
+static void series(void)
+{
+    const double c[6] = {0, 0, 0, 0, 1, 0}, gamma = 0.1;
+    struct emitter s = {.x = 40, .y = 40, .flux = 1, .coef = c, .nmax = 2, .parity = 1, .beta = 0.4, .dilation = 1};
+    struct view v = {.nx = 81, .ny = 81, .pixel = 0.1, .g1 = tanh(gamma) * cos(1.4), .g2 = tanh(gamma) * sin(1.4)};
+    struct image exact = render(&v, 1e-9, 1, &s, 1, NULL);
+    double before = 1, error[9] = {0};
+    for (int order = 1; order <= 8; order++) {
+        v.shear_order = order;
+        struct image im = render(&v, 1e-9, 1, &s, 1, NULL);
+        double d2 = 0, f2 = 0;
+        for (size_t i = 0; i < image_count(&im); i++) {
+            d2 += pow((double)im.pix[i] - (double)exact.pix[i], 2);
+            f2 += pow((double)exact.pix[i], 2);
+        }
+        error[order] = sqrt(d2 / f2);
+        check_that(error[order] < 0.3 * before, "shear order %d against exact: %.2g in L2", order, error[order]);
+        before = fmax(error[order], 1e-7);
+        image_free(&im);
+    }
+    check_that(error[4] > 3e-5 && error[4] < 2.2e-4, "order 4 at gamma = .1, n = 2: %.2g (reference 1.1e-4)", error[4]);
+    image_free(&exact);
+}
+
+/* Positions that are edges, far away or no numbers; brightness from nothing to everything; shear undone. */
+static void strange(const struct otf *t)
+{
+    const double c[1] = {1 / (2 * sqrt(PI) * 0.1)};
+    const struct emitter good = {.x = 20, .y = 20, .flux = 1, .coef = c, .parity = 1, .beta = 0.1, .dilation = 1};
+    struct emitter s[12];
+    for (int i = 0; i < 12; i++)
+        s[i] = good;
+    s[1].x = 1e9, s[2].y = -1e300, s[3].x = NAN, s[4].flux = INFINITY, s[5].beta = -1, s[6].dilation = 0;
+    s[7].flux = 0, s[8].g1 = 1.5, s[9].x = -0.5, s[10].x = 39.5, s[11].y = 60;
+    struct plan p;
+    for (int psf = 0; psf < 2; psf++) {
+        struct view v = {.nx = 40, .ny = 40, .pixel = 0.1, .psf = psf ? t : NULL};
+        struct image im = render(&v, 1e-4, 12, s, 2, &p);
+        check_that(p.n_bad == 5 && fabs(sum_of(&im) - 2) < 0.06,
+                   "%s: 5 impossible objects counted, the others drawn (sum %.4f of 2)", psf ? "PSF" : "no PSF", sum_of(&im));
+        image_free(&im);
+    }
+    /* 1e5 objects on one pixel, faint beside bright */
+    enum { MANY = 100000 };
+    struct emitter *many = malloc(MANY * sizeof *many);
+    for (int i = 0; i < MANY; i++) {
+        many[i] = good;
+        many[i].coef = NULL;
+        many[i].flux = i ? 0.1 : 1e6;
+    }
+    struct view v = {.nx = 40, .ny = 40, .pixel = 0.1};
+    struct image im = render(&v, 1e-4, MANY, many, 1, NULL);
+    struct check k = check_begin("1e5 faint points on a bright one: flux");
+    check_close(&k, im.pix[20 * 40 + 20], 1e6 + 0.1 * (MANY - 1), 0.07);
+    check_end(&k);
+    image_free(&im);
+    free(many);
+    /* own shear undone by the field's */
+    struct emitter e = good;
+    e.g1 = -0.02, e.g2 = 0.6;
+    v.g1 = 0.02, v.g2 = -0.6;
+    struct image undone = render(&v, 1e-8, 1, &e, 1, NULL);
+    v.g1 = v.g2 = 0;
+    struct image plain = render(&v, 1e-8, 1, &good, 1, NULL);
+    k = check_begin("a shear undone by its opposite, of the peak");
+    for (size_t i = 0; i < image_count(&plain); i++)
+        check_close(&k, undone.pix[i] / plain.pix[20 * 40 + 20], plain.pix[i] / plain.pix[20 * 40 + 20], 1e-7);
+    check_end(&k);
+    image_free(&undone);
+    image_free(&plain);
+}
+
+int main(void)
+{
+    struct otf t = {0};
+    telescope(&t);
+    determinism(&t);
+    only_what_is_needed(&t);
+    series();
+    strange(&t);
+    accuracy(&t);
+    otf_free(&t);
+    return check_status();
+}
