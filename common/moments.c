@@ -31,9 +31,32 @@ void moments_scratch_free(struct moments_scratch *s)
     *s = (struct moments_scratch){0};
 }
 
-static double pixel(const struct moments_map *m, size_t k)
+/* n pixels from `row` on, sky subtracted, and their variance. */
+static void row_take(const struct moments_map *m, size_t row, long n, double sky, double sky_var,
+                     double *restrict pix, double *restrict var)
 {
-    return m->pix64 ? m->pix64[k] : (double)m->pix[k];
+    double per = m->gain > 0 ? 1 / m->gain : 0;
+    if (m->pix64)
+        for (long i = 0; i < n; i++)
+            pix[i] = m->pix64[row + (size_t)i] - sky;
+    else
+        for (long i = 0; i < n; i++)
+            pix[i] = (double)m->pix[row + (size_t)i] - sky;
+    for (long i = 0; i < n; i++)
+        var[i] = sky_var + per * (pix[i] > 0 ? pix[i] : 0);
+}
+
+/* Put the sky variance of the weight map in; blanks where the weight is none. */
+static void row_weigh(const struct moments_map *m, size_t row, long n, double here, double sky_var,
+                      double *restrict var, double *restrict state)
+{
+    for (long i = 0; i < n; i++) {
+        double wt = (double)m->weight[row + (size_t)i];
+        if (wt > 0 && isfinite(wt))
+            var[i] += (m->weight_inverse ? 1 / wt : sky_var * here / wt) - sky_var;
+        else
+            state[i] = BAD;
+    }
 }
 
 static long clip(double v, long lo, long hi)
@@ -77,29 +100,25 @@ static int stamp_cut(struct stamp *st, const struct moments_map *m, const struct
     size_t own = (size_t)clip(floor(o->y + 0.5), 0, m->ny - 1) * (size_t)m->nx +
                  (size_t)clip(floor(o->x + 0.5), 0, m->nx - 1);
     double here = m->weight && m->weight[own] > 0 ? (double)m->weight[own] : 1;
+    memset(st->state, 0, (size_t)st->nx * (size_t)st->ny * sizeof *st->state);
     for (long j = 0; j < st->ny; j++) {
-        size_t row = (size_t)(st->y0 + j) * (size_t)m->nx + (size_t)st->x0;
-        size_t k = (size_t)j * (size_t)st->nx;
-        for (long i = 0; i < st->nx; i++, row++, k++) {
-            double v = pixel(m, row) - o->sky, var = o->sky_var;
-            int state = isfinite(v) ? GOOD : BAD;
-            if (m->weight) {
-                double wt = (double)m->weight[row];
-                var = m->weight_inverse ? 1 / wt : var * here / wt;
-                if (!(wt > 0 && isfinite(wt)))
-                    state = BAD;
-            }
-            if (m->label && m->label[row] > 0 && (double)m->label[row] != o->label) {
-                state = NEIGHBOUR;
+        size_t row = (size_t)(st->y0 + j) * (size_t)m->nx + (size_t)st->x0, k = (size_t)j * (size_t)st->nx;
+        row_take(m, row, st->nx, o->sky, o->sky_var, st->pix + k, st->var + k);
+        for (long i = 0; i < st->nx; i++)
+            if (!isfinite(st->pix[k + (size_t)i]))
+                st->state[k + (size_t)i] = BAD;
+        if (m->weight)
+            row_weigh(m, row, st->nx, here, o->sky_var, st->var + k, st->state + k);
+        for (long i = 0; m->label && i < st->nx; i++)
+            if (m->label[row + (size_t)i] > 0 && (double)m->label[row + (size_t)i] != o->label) {
+                st->state[k + (size_t)i] = NEIGHBOUR;
                 st->neighbours = 1;
             }
-            st->bad |= state == BAD;
-            if (m->gain > 0 && v > 0)
-                var += v / m->gain;
-            st->state[k] = state;
-            st->pix[k] = state == GOOD ? v : 0;
-            st->var[k] = state == GOOD ? var : 0;
-        }
+        for (long i = 0; i < st->nx; i++)
+            if (st->state[k + (size_t)i] != GOOD) {
+                st->bad |= st->state[k + (size_t)i] == BAD;
+                st->pix[k + (size_t)i] = st->var[k + (size_t)i] = 0;
+            }
     }
     return OK;
 }

@@ -1,0 +1,396 @@
+/*
+ * rrgshape.c - shapes of the objects of a catalogue: weighted moments, PSF
+ * correction, ellipticity and response to shear.
+ */
+#include "err.h"
+#include "imageio.h"
+#include "opt.h"
+#include "psfio.h"
+#include "shapecat.h"
+#include "sky.h"
+#include "starpsf.h"
+#include "tableio.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct params {
+    const char *stars, *psf, *weight, *segmentation;
+    double width, fixed, min, max, cut, scale;
+    int fourth, correction, average;
+    int centroid, no_recenter, no_background, stars_only;
+    long max_stars;
+};
+
+/* One image with what a measurement on it needs. */
+struct input {
+    const char *name;
+    long nx, ny;
+    float *pix;
+    double *pix64;
+    struct header hdr;
+    struct table cat;
+    struct image weight, label;
+    struct moments_map map;
+    double scale;             /* arcsec per pixel; NaN when unknown */
+};
+
+static void fail(const char *file, const struct err *e)
+{
+    die(EXIT_RUN, "%s: %s", file, e->text);
+}
+
+static void check(int st, const char *what)
+{
+    if (st)
+        die(EXIT_RUN, "%s: %s", what, err_text(st));
+}
+
+/* Pixels as float32, or as doubles when the file has doubles. */
+static void read_pixels(struct input *in, const char *name, double max_memory)
+{
+    struct err e;
+    struct fits_in *f;
+    if (fits_in_open(&f, name, max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    int k = fits_in_selected(f);
+    if (k < 0)
+        die(EXIT_RUN, "%s: no image in this file", name);
+    const struct hdu *h = fits_in_hdu(f, k);
+    int deep = h->bitpix == -64;
+    size_t n = (size_t)h->nx * (size_t)h->ny, size = deep ? sizeof(double) : sizeof(float);
+    if (max_memory > 0 && (double)n * (double)size > max_memory)
+        die(EXIT_RUN, "%s: needs %.0f bytes: raise --max-memory", name, (double)n * (double)size);
+    void *mem = malloc(n * size);
+    if (!mem)
+        die(EXIT_RUN, "%s: %s", name, err_text(E_NOMEM));
+    in->name = name;
+    in->nx = h->nx;
+    in->ny = h->ny;
+    in->pix = deep ? NULL : mem;
+    in->pix64 = deep ? mem : NULL;
+    int st = deep ? fits_in_rows_double(f, k, 0, 0, in->ny, mem, &e) : fits_in_rows(f, k, 0, 0, in->ny, mem, &e);
+    if (st == OK)
+        st = fits_in_header(f, k, &in->hdr, &e);
+    if (st)
+        die(EXIT_RUN, "%s", e.text);
+    fits_in_close(f);
+}
+
+/* arcsec per pixel: option, header, world coordinates, catalogue; else NaN. */
+static double pixel_scale(const struct input *in, double option)
+{
+    struct sky *s;
+    double v;
+    if (option > 0)
+        return option;
+    if (header_double(&in->hdr, "PIXSCALE", &v) == OK && v > 0)
+        return v;
+    if (sky_open(&s, &in->hdr, NULL) == OK) {
+        v = sky_scale(s);
+        sky_close(s);
+        if (v > 0)
+            return v;
+    }
+    if (table_key_number(&in->cat, "PIXSCALE", &v) == OK && v > 0)
+        return v;
+    return NAN;
+}
+
+static void read_map(struct image *im, const struct input *in, const char *name, double max_memory)
+{
+    struct err e;
+    if (image_read(im, name, max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (im->nx != in->nx || im->ny != in->ny)
+        die(EXIT_RUN, "%s: %ld x %ld pixels, but %s has %ld x %ld", name, im->nx, im->ny, in->name, in->nx, in->ny);
+}
+
+/* Image, catalogue and maps; weight and segmentation may be NULL. */
+static void read_input(struct input *in, const char *image, const char *cat, const struct params *p,
+                       const char *weight, const char *label, double max_memory)
+{
+    struct err e;
+    *in = (struct input){0};
+    read_pixels(in, image, max_memory);
+    if (table_read(&in->cat, cat, max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    in->map = (struct moments_map){.nx = in->nx, .ny = in->ny, .pix = in->pix, .pix64 = in->pix64,
+                                   .gain = header_double_or(&in->hdr, "GAIN", 0)};
+    if (weight) {
+        char type[72] = "";
+        read_map(&in->weight, in, weight, max_memory);
+        in->map.weight = in->weight.pix;
+        in->map.weight_inverse = header_str(&in->weight.hdr, "WHTTYPE", type, sizeof type) == OK && strcmp(type, "IVM") == 0;
+    }
+    if (label) {
+        read_map(&in->label, in, label, max_memory);
+        in->map.label = in->label.pix;
+    }
+    in->scale = pixel_scale(in, p->scale);
+}
+
+static void free_input(struct input *in)
+{
+    free(in->pix);
+    free(in->pix64);
+    header_free(&in->hdr);
+    table_free(&in->cat);
+    image_free(&in->weight);
+    image_free(&in->label);
+}
+
+static void need_scale(const struct input *in)
+{
+    if (!isfinite(in->scale))
+        die(EXIT_RUN, "%s: no PIXSCALE and no world coordinates: give --pixscale", in->name);
+}
+
+/* Widths and limits in pixels of this image. */
+static struct shapecat_options options(const struct params *p, const struct input *in, int threads)
+{
+    double px = isfinite(in->scale) ? in->scale : 1;
+    struct shapecat_options o = {
+        .mult = p->width, .fixed = p->fixed, .threads = threads, .no_background = p->no_background,
+        .min = p->min > 0 ? p->min / px : fmax(0.8, 0.1 / px), .max = p->max / px, .first_width = 0.18 / px,
+        .moments = MOMENTS_DEFAULTS,
+        .rrg = {.first = p->correction == 1, .plain = p->fourth == 1, .centroid = p->centroid}};
+    o.moments.cut = p->cut;
+    o.moments.fixed_centre = p->no_recenter;
+    if (!(o.max >= o.min))
+        o.max = o.min;
+    double rms = 0;
+    if (!table_find(&in->cat, "BACKRMS"))
+        check(shapecat_noise(&in->map, &rms), in->name);
+    o.sky_var = rms * rms;
+    return o;
+}
+
+/* Measure the stars of an image; the median size with their own widths goes to *own. */
+static void measure_stars(struct starmom *s, const struct input *in, const char *cat, const struct params *p,
+                          int threads, double *own)
+{
+    struct err e;
+    struct moments_object *stars;
+    need_scale(in);
+    struct shapecat_options o = options(p, in, threads);
+    o.fixed = 0;
+    o.moments.fixed_centre = 0;
+    if (shapecat_objects(&in->cat, &o, &stars, &e))
+        fail(cat, &e);
+    size_t n = 0;
+    const struct column *flags = table_find(&in->cat, "FLAGS");
+    for (size_t i = 0; i < in->cat.nrow; i++)
+        if (!flags || table_number(flags, i) == 0)
+            stars[n++] = stars[i];
+    *s = (struct starmom){.dstar_w = fmax(0.8, 0.1 / in->scale)};
+    check(starmom_widths(s, STARMOM_WIDTHS, 0.8, fmax(1 / in->scale, 2)), in->name);
+    int st = starmom_measure(s, &in->map, n, stars, &o.moments, p->max_stars, p->average == 1, threads);
+    if (st == E_MISSING)
+        die(EXIT_RUN, "%s: fewer than 2 usable stars of %zu: look at the star catalogue", in->name, n);
+    check(st, in->name);
+    check(shapecat_own_size(&in->map, n, stars, &o.moments, own), in->name);
+    free(stars);
+}
+
+/* A star-moment file; its pixels must be those of the image. */
+static void read_curve(struct starmom *s, const char *name, const struct input *in, double max_memory, double *own)
+{
+    struct err e;
+    struct table t = {0};
+    double scale;
+    if (table_read(&t, name, max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (starmom_from_table(s, &t, &e))
+        fail(name, &e);
+    if (table_key_number(&t, "PIXSCALE", &scale) == OK && isfinite(in->scale) && !(fabs(scale / in->scale - 1) < 1e-6))
+        die(EXIT_RUN, "%s: star moments for pixels of %g arcsec, but %s has %g", name, scale, in->name, in->scale);
+    if (table_key_number(&t, "DSTAROWN", own) != OK)
+        *own = NAN;
+    table_free(&t);
+}
+
+/* Moments of a PSF that is known: a file of psfgen or any image of a PSF. */
+static void known_psf(struct starmom *s, const char *name, const struct input *in, double max_memory)
+{
+    struct err e;
+    struct otf t;
+    struct psf_options po = {.max_memory = max_memory};
+    need_scale(in);
+    if (psf_read(name, &po, &t, NULL, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (t.pixel > 0 && !(fabs(t.pixel / in->scale - 1) < 1e-6))
+        die(EXIT_RUN, "%s: contains a pixel of %g arcsec, but %s has %g", name, t.pixel, in->name, in->scale);
+    int st = starmom_from_otf(s, &t, in->scale);
+    if (st == E_RANGE)
+        die(EXIT_RUN, "%s: PSF too small to be weighed with 1 arcsec: at least 17 arcsec a side", name);
+    check(st, name);
+    otf_free(&t);
+}
+
+/* --psf FILE|none, --stars FILE or --stars IMAGE,CATALOGUE; NULL: no correction. */
+static struct starmom *find_psf(struct starmom *s, const struct input *in, const struct params *p,
+                                const struct common *c, double *own)
+{
+    *own = NAN;
+    if (p->psf && strcmp(p->psf, "none") == 0)
+        return NULL;
+    if (p->psf) {
+        known_psf(s, p->psf, in, c->max_memory);
+        return s;
+    }
+    const char *comma = strrchr(p->stars, ',');
+    if (!comma || access(p->stars, F_OK) == 0) {
+        read_curve(s, p->stars, in, c->max_memory, own);
+        return s;
+    }
+    struct input stars;
+    char *image = strndup(p->stars, (size_t)(comma - p->stars));
+    if (!image)
+        die(EXIT_RUN, "%s: %s", p->stars, err_text(E_NOMEM));
+    read_input(&stars, image, comma + 1, p, NULL, NULL, c->max_memory);
+    if (isfinite(in->scale) && !(fabs(stars.scale / in->scale - 1) < 1e-6))
+        die(EXIT_RUN, "%s: pixels of %g arcsec, but %s has %g", image, stars.scale, in->name, in->scale);
+    measure_stars(s, &stars, comma + 1, p, c->threads, own);
+    free_input(&stars);
+    free(image);
+    return s;
+}
+
+/* What the image knows wins over what the catalogue says: it may be another image than the detection's. */
+static void copy_keywords(struct table *t, const struct header *h)
+{
+    static const char *const number[] = {"PIXSCALE", "CCDSCALE", "EXPTIME", "TOTTIME", "MAGZERO", "GAIN",
+                                         "SHEAR1", "SHEAR2", "PSFFWHM", "NOISECOR"};
+    static const char *const text[] = {"SETNAME", "SEED", "FIELDID"};
+    for (size_t k = 0; k < sizeof number / sizeof *number; k++) {
+        double v;
+        if (header_double(h, number[k], &v) == OK)
+            check(table_set_number(t, number[k], v), number[k]);
+    }
+    for (size_t k = 0; k < sizeof text / sizeof *text; k++) {
+        char v[72];
+        if (header_str(h, text[k], v, sizeof v) == OK)
+            check(table_set_text(t, text[k], v), text[k]);
+    }
+}
+
+static void set_dstar(struct table *t, const struct starmom *s, double own, double scale)
+{
+    if (isfinite(s->dstar))
+        check(table_set_number(t, "DSTAR", s->dstar), "DSTAR");
+    if (isfinite(s->dstar_err))
+        check(table_set_number(t, "DSTARERR", s->dstar_err), "DSTARERR");
+    if (isfinite(own))
+        check(table_set_number(t, "DSTAROWN", own), "DSTAROWN");
+    if (isfinite(scale))
+        check(table_set_number(t, "PIXSCALE", scale), "PIXSCALE");
+}
+
+static void write_catalogue(const struct table *t, const struct program *prog, const struct opt *own,
+                            const struct common *c)
+{
+    struct err e;
+    char *record = opt_record(prog, own, c);
+    if (table_write(t, c->out, record, c->argv, (size_t)c->argc, &e))
+        die(EXIT_RUN, "%s", e.text);
+    free(record);
+}
+
+/* Shapes of the galaxies; the catalogue of `in` gets the columns. */
+static void measure_objects(struct input *in, const struct params *p, const struct common *c)
+{
+    struct err e;
+    struct moments_object *objects;
+    struct starmom stars;
+    double own;
+    long bad = 0;
+    if (!(p->fixed > 0))
+        need_scale(in);
+    struct starmom *psf = find_psf(&stars, in, p, c, &own);
+    struct shapecat_options o = options(p, in, c->threads);
+    if (shapecat_objects(&in->cat, &o, &objects, &e))
+        fail(c->argv[1], &e);
+    if (c->check) {
+        printf("%zu objects on %ld x %ld pixels of %g arcsec; widths %g to %g px; %s; about %.2g s\n", in->cat.nrow,
+               in->nx, in->ny, in->scale, o.min, o.max, psf ? "PSF corrected" : "no PSF correction",
+               1e-5 * (double)in->cat.nrow);
+        free(objects);
+        return;
+    }
+    struct progress bar;
+    progress_begin(&bar, "shapes", (long)in->cat.nrow, c->quiet);
+    int st = shapecat_measure(&in->cat, &in->map, objects, psf, &o, &bar, &bad);
+    progress_end(&bar);
+    if (st == E_DATA)
+        die(EXIT_RUN, "%s: a column with the name of a shape column is of another type", c->argv[1]);
+    check(st, c->argv[1]);
+    copy_keywords(&in->cat, &in->hdr);
+    if (psf)
+        set_dstar(&in->cat, psf, own, in->scale);
+    if (c->verbose)
+        warn("%s: %zu objects, %ld with flags", c->argv[1], in->cat.nrow, bad);
+    free(objects);
+}
+
+/* The star-moment file instead of a catalogue. */
+static void measure_curve(struct input *in, const struct params *p, const struct common *c, struct table *out)
+{
+    struct starmom s;
+    double own;
+    measure_stars(&s, in, c->argv[1], p, c->threads, &own);
+    check(starmom_to_table(&s, out), c->argv[1]);
+    copy_keywords(out, &in->hdr);
+    set_dstar(out, &s, own, in->scale);
+    if (c->verbose)
+        warn("%s: %ld stars, d* = %.4f px at w = %.3f px", c->argv[1], s.stars[0], s.dstar, s.dstar_w);
+}
+
+int main(int argc, char **argv)
+{
+    struct common c = COMMON_DEFAULTS;
+    struct params p = {.width = 1.5, .max = 0.45, .cut = 4};
+    const struct program prog = {
+        "rrgshape", "measure shapes: Gaussian-weighted moments corrected for the PSF, response to shear",
+        "IMAGE CATALOGUE", 2, 2,
+        "rrgshape --stars-only stars.fits stars.cat -o stars.rrg\n"
+        "rrgshape image.fits image.cat --stars stars.rrg -o image.shapes"};
+    const struct opt own[] = {
+        {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file, or STARS_IMAGE,STARS_CATALOGUE", NULL, 1},
+        {"psf", 'p', OPT_STR, &p.psf, 0, 0, "FILE", "PSF file instead of stars; none: no correction", NULL, 1},
+        {"stars-only", 0, OPT_FLAG, &p.stars_only, 0, 0, NULL, "the operands are stars: write the star-moment file", NULL, 0},
+        {"width", 'w', OPT_REAL, &p.width, 1e-3, 1e3, "K", "width of the weight in units of sqrt(A_IMAGE B_IMAGE)", NULL, 0},
+        {"fixed-width", 0, OPT_REAL, &p.fixed, 0, 1e4, "PX", "width of the weight for all objects, pixels (0: not fixed)", NULL, 0},
+        {"width-min", 0, OPT_REAL, &p.min, 0, 1e4, "ARCSEC", "smallest width, arcsec (0: max(0.8 px, 0.1))", NULL, 0},
+        {"width-max", 0, OPT_REAL, &p.max, 1e-6, 1e4, "ARCSEC", "largest width, arcsec", NULL, 0},
+        {"weight-cut", 0, OPT_REAL, &p.cut, 0.5, 100, "K", "radius where the weight ends, in widths", NULL, 0},
+        {"fourth", 0, OPT_CHOICE, &p.fourth, 0, 0, "HOW", "PSF correction of the fourth moments", "exact|plain", 0},
+        {"psf-correction", 0, OPT_CHOICE, &p.correction, 0, 0, "HOW", "PSF freed of its weight; first: width 0.18 arcsec", "resummed|first", 0},
+        {"centroid-term", 0, OPT_FLAG, &p.centroid, 0, 0, NULL, "add the motion of the centroid to P11, P22", NULL, 0},
+        {"no-recenter", 0, OPT_FLAG, &p.no_recenter, 0, 0, NULL, "measure about X_IMAGE, Y_IMAGE", NULL, 0},
+        {"no-background", 0, OPT_FLAG, &p.no_background, 0, 0, NULL, "do not subtract the column BACKGROUND", NULL, 0},
+        {"weight", 0, OPT_STR, &p.weight, 0, 0, "FILE", "weight map: 1/variance when WHTTYPE is IVM, else relative", NULL, 1},
+        {"segmentation", 0, OPT_STR, &p.segmentation, 0, 0, "FILE", "labels of pixels: neighbours are masked", NULL, 1},
+        {"star-average", 0, OPT_CHOICE, &p.average, 0, 0, "HOW", "average over stars", "mean|median", 0},
+        {"max-stars", 0, OPT_LONG, &p.max_stars, 0, 1e9, "N", "use the first N good stars (0: all)", NULL, 0},
+        {"pixscale", 'x', OPT_REAL, &p.scale, 0, 1e4, "ARCSEC", "pixel scale over the header's, arcsec (0: header)", NULL, 0},
+        {0}};
+    opt_parse(&prog, own, &c, argc, argv);
+    if (!p.stars_only && !p.stars == !p.psf)
+        die(EXIT_USAGE, "give one of --stars FILE, --psf FILE, --psf none");
+
+    struct input in;
+    struct table curve = {0};
+    read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);
+    if (p.stars_only)
+        measure_curve(&in, &p, &c, &curve);
+    else
+        measure_objects(&in, &p, &c);
+    if (!c.check)
+        write_catalogue(p.stars_only ? &curve : &in.cat, &prog, own, &c);
+    table_free(&curve);
+    free_input(&in);
+    return EXIT_DONE;
+}

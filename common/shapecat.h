@@ -1,0 +1,57 @@
+/*
+ * shapecat.h - shapes of a catalogue of objects on an image: from the columns
+ * of a detection to the columns of a shape catalogue, and star-moment tables.
+ */
+#ifndef PIXSHEAR_SHAPECAT_H
+#define PIXSHEAR_SHAPECAT_H
+
+#include "err.h"
+#include "moments.h"
+#include "progress.h"
+#include "rrg.h"
+#include "starmom.h"
+#include "table.h"
+
+struct shapecat_options {
+    double mult;              /* width of the weight in units of sqrt(A_IMAGE B_IMAGE) */
+    double fixed;             /* width for all objects, px; 0: none */
+    double min, max;          /* limits of the width, px */
+    double sky_var;           /* variance of the sky noise where there is no BACKRMS */
+    int no_background;        /* BACKGROUND is not subtracted */
+    double first_width;       /* with rrg.first: width of the PSF's weight, px */
+    struct moments_options moments;
+    struct rrg_options rrg;
+    int threads;
+};
+
+/*
+ * Start positions, widths, sky of every row from NUMBER X_IMAGE Y_IMAGE A_IMAGE
+ * B_IMAGE [BACKGROUND] [BACKRMS]; allocated.  A_IMAGE, B_IMAGE that are not > 0
+ * give the smallest width.  E_MISSING: e names the column.
+ */
+MUST_CHECK int shapecat_objects(const struct table *t, const struct shapecat_options *opt,
+                                struct moments_object **objects, struct err *e);
+
+/*
+ * Measure and correct every row and add (or replace) the shape columns.
+ * psf NULL: no correction, P = 0.  bad: rows with FLAGS_RRG != 0.
+ */
+MUST_CHECK int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
+                                const struct starmom *psf, const struct shapecat_options *opt,
+                                struct progress *bar, long *bad);
+
+/*
+ * Star moments as a table: WIDTH [pixel] NSTARS PXX .. PYYYY and errors, one row
+ * per width; keywords DSTAR, DSTARERR, DSTARW [pixel].
+ */
+MUST_CHECK int starmom_to_table(const struct starmom *s, struct table *t);
+MUST_CHECK int starmom_from_table(struct starmom *s, const struct table *t, struct err *e);
+
+/* Median D of the stars, each measured with its own width (as a galaxy would be); NaN when there is none. */
+MUST_CHECK int shapecat_own_size(const struct moments_map *map, size_t n, const struct moments_object *stars,
+                                 const struct moments_options *opt, double *dstar);
+
+/* Robust rms of an image: 1.4826 x median |I - median| of up to 1e6 pixels spread over it. */
+MUST_CHECK int shapecat_noise(const struct moments_map *map, double *rms);
+
+#endif
