@@ -35,12 +35,12 @@ int quad_legendre(int n, double *x, double *w)
 }
 
 /* phi_{n-1}(x) and phi_n(x), n >= 1, by the half-Gaussian recurrence of shapelet.c. */
-static void hermite_pair(int n, double x, double *below, double *here)
+static void hermite_pair(int n, const double *up, const double *down, double x, double *below, double *here)
 {
     const double e = exp(-0.25 * x * x);
     double p = 0, q = 0.75112554446494248286 * e;     /* pi^(-1/4) */
     for (int k = 0; k < n; k++) {
-        double next = sqrt(2.0 / (k + 1)) * x * q - sqrt(k / (k + 1.0)) * p;
+        double next = up[k] * x * q - down[k] * p;
         p = q;
         q = next;
     }
@@ -62,13 +62,20 @@ int quad_hermite(int n, double *x, double *w)
 {
     if (n < 1 || n > QUAD_NMAX)
         return E_RANGE;
+    double up[QUAD_NMAX], down[QUAD_NMAX];
+    for (int k = 0; k < n; k++) {
+        up[k] = sqrt(2.0 / (k + 1));
+        down[k] = sqrt(k / (k + 1.0));
+    }
     for (int i = 0; i < (n + 1) / 2; i++) {
         double t = 2 * i + 1 == n ? 0 : hermite_guess(n, i);
-        double below, here;
-        hermite_pair(n, t, &below, &here);
-        for (int step = 0; step < 5 && t > 0; step++) {
-            t -= here / (sqrt(2.0 * n) * below - t * here);
-            hermite_pair(n, t, &below, &here);
+        double below, here, step = 1;
+        hermite_pair(n, up, down, t, &below, &here);
+        /* quadratic convergence: after a step of 1e-9 nothing is left to gain */
+        for (int k = 0; k < 8 && t > 0 && fabs(step) > 1e-9; k++) {
+            step = here / (sqrt(2.0 * n) * below - t * here);
+            t -= step;
+            hermite_pair(n, up, down, t, &below, &here);
         }
         x[i] = -t;
         x[n - 1 - i] = t;

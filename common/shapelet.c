@@ -15,6 +15,7 @@
 
 #define BLOCK 64               /* points worked on together */
 #define FAR 60.0               /* |x|/beta beyond which everything is 0 */
+#define STRIP 32               /* columns of a stamp summed together */
 #define SMALL_PIXEL 0.1        /* pixel / beta below which the paired recurrence is used */
 
 static const double PI_M14 = 0.75112554446494248286;   /* pi^(-1/4) */
@@ -90,35 +91,51 @@ int shapelet_basis(int nmax, double beta, int m, const double *x, double *b)
 }
 
 /*
- * Integral of phi_0 over a pixel of centre c and width h divided by phi_0(c), for
- * h max(1, |c|) < 6: h times the sum of even terms He_2k(c) (h/2)^2k / (2k+1)!.
+ * Integrals of phi_0 over small pixels of centre c and width h, times norm: phi_0(c) h times
+ * the sum of even terms He_2k(c) (h/2)^2k / (2k+1)!.  30 terms serve h max(1, |c|) < 6.
  */
-static double central_series(double c, double h)
+WIDE static void small_integral_0(int m, const double *c, const double *h, const double *e,
+                                  double norm, double *b)
 {
-    const double u = 0.5 * h;
-    double below = 0, term = 1, sum = 1;
-    for (int n = 0; n < 30; n++) {
-        double next = u * (c * term - u * below) / (n + 1);
-        below = term;
-        term = next;
-        if (n % 2)
-            sum += term / (n + 2);
+    double below[BLOCK], term[BLOCK], sum[BLOCK];
+    for (int i = 0; i < m; i++) {
+        below[i] = 0;
+        term[i] = sum[i] = 1;
     }
-    return h * sum;
+    for (int n = 1; n <= 30; n++) {
+        const double step = 0.5 / n, weight = n % 2 ? 0 : 1.0 / (n + 1);
+        for (int i = 0; i < m; i++) {
+            double next = step * h[i] * (c[i] * term[i] - 0.5 * h[i] * below[i]);
+            below[i] = term[i];
+            term[i] = next;
+            sum[i] += weight * next;
+        }
+    }
+    for (int i = 0; i < m; i++)
+        b[i] = PI_M14 * norm * e[i] * e[i] * h[i] * sum[i];
 }
 
-/* Integral of phi_0 over [a, b] without subtracting near-equals; c and h: centre and width. */
-static double integral_0(double a, double b, double c, double h)
+/* Integrals of phi_0 over [t[i], t[i+1]], times norm, without subtracting near-equals. */
+static void integral_0(int m, const double *t, const double *c, const double *h, double norm, double *b)
 {
-    if (h * fmax(1, fabs(c)) < 2) {
-        double e = half_gauss(c);
-        return PI_M14 * e * e * central_series(c, h);
+    double e[BLOCK], tail = 0;
+    int any = 0;
+    for (int i = 0; i < m; i++)
+        any |= h[i] * fmax(1, fabs(c[i])) < 2;
+    if (any) {
+        for (int i = 0; i < m; i++)
+            e[i] = half_gauss(c[i]);
+        small_integral_0(m, c, h, e, norm, b);
     }
-    if (a > 0)
-        return PI_P14 * M_SQRT1_2 * (erfc(a * M_SQRT1_2) - erfc(b * M_SQRT1_2));
-    if (b < 0)
-        return PI_P14 * M_SQRT1_2 * (erfc(-b * M_SQRT1_2) - erfc(-a * M_SQRT1_2));
-    return PI_P14 * M_SQRT1_2 * (erf(b * M_SQRT1_2) - erf(a * M_SQRT1_2));
+    int known = -1;             /* edge whose tail integral is in `tail` */
+    for (int i = 0; i < m; i++) {
+        if (h[i] * fmax(1, fabs(c[i])) < 2)
+            continue;
+        const double near = known == i ? tail : erfc(fabs(t[i]) * M_SQRT1_2);
+        tail = erfc(fabs(t[i + 1]) * M_SQRT1_2);
+        known = i + 1;
+        b[i] = norm * PI_P14 * M_SQRT1_2 * (t[i] > 0 ? near - tail : t[i + 1] < 0 ? tail - near : (1 - near) + (1 - tail));
+    }
 }
 
 /* Row n >= 1 of the integrals from I_{n-2} and the edge differences of phi_{n-1}. */
@@ -147,8 +164,7 @@ WIDE static void pixel_block(int nmax, int m, const double *t, const double *c, 
         before[i] = 0;
         here[i] = PI_M14 * e[i];
     }
-    for (int i = 0; i < m; i++)
-        b[i] = norm * integral_0(t[i], t[i + 1], c[i], h[i]);
+    integral_0(m, t, c, h, norm, b);
     for (int n = 1; n <= nmax; n++) {
         const double up = sqrt(2.0 / n), down = sqrt((n - 1.0) / n);
         for (int i = 0; i < m; i++)
@@ -169,16 +185,17 @@ WIDE static void pixel_block(int nmax, int m, const double *t, const double *c, 
 WIDE static void paired_block(int nmax, int m, const double *c, const double *h,
                               double norm, size_t stride, double *b)
 {
-    double s[BLOCK], a0[BLOCK], a1[BLOCK], d0[BLOCK], d1[BLOCK], diff[BLOCK];
+    double e[BLOCK], s[BLOCK], a0[BLOCK], a1[BLOCK], d0[BLOCK], d1[BLOCK], diff[BLOCK];
     for (int i = 0; i < m; i++) {
-        const double e = half_gauss(c[i]), z = 0.5 * c[i] * h[i];
-        const double seed = PI_M14 * e * exp(-0.125 * h[i] * h[i]);
-        s[i] = e * norm;
+        e[i] = half_gauss(c[i]);
+        s[i] = e[i] * norm;
+        const double seed = PI_M14 * e[i] * exp(-0.125 * h[i] * h[i]);
+        const double z = expm1(0.5 * c[i] * h[i]), down = z / (1 + z);      /* 1 - exp(-ch/2) */
         a0[i] = d0[i] = 0;
-        a1[i] = seed * cosh(z);
-        d1[i] = -2 * seed * sinh(z);
-        b[i] = norm * (PI_M14 * e * e * central_series(c[i], h[i]));
+        a1[i] = seed * (1 + 0.5 * (z - down));
+        d1[i] = -seed * (z + down);
     }
+    small_integral_0(m, c, h, e, norm, b);
     for (int n = 1; n <= nmax; n++) {
         const double up = sqrt(2.0 / n), down = sqrt((n - 1.0) / n);
         for (int i = 0; i < m; i++) {
@@ -224,11 +241,10 @@ int shapelet_pixel(int nmax, double beta, int m, const double *edge, double *b)
     return OK;
 }
 
-/* One strip of at most 32 columns of shapelet_pixel_sum. */
+/* One strip of w <= STRIP columns of shapelet_pixel_sum. */
 WIDE static void sum_strip(int nmax, const double *c, int w, size_t m1, const double *bx,
                            size_t m2, const double *by, double *out)
 {
-    enum { STRIP = 32 };
     double v[(SHAPELET_NMAX + 1) * STRIP];
     for (int n2 = 0; n2 <= nmax; n2++) {
         double *restrict row = v + n2 * STRIP;
@@ -258,8 +274,8 @@ int shapelet_pixel_sum(int nmax, const double *c, int m1, const double *bx,
 {
     if (nmax < 0 || nmax > SHAPELET_NMAX || m1 < 0 || m2 < 0)
         return E_RANGE;
-    for (int i = 0; i < m1; i += 32)
-        sum_strip(nmax, c, m1 - i < 32 ? m1 - i : 32, (size_t)m1, bx + i, (size_t)m2, by, out + i);
+    for (int i = 0; i < m1; i += STRIP)
+        sum_strip(nmax, c, m1 - i < STRIP ? m1 - i : STRIP, (size_t)m1, bx + i, (size_t)m2, by, out + i);
     return OK;
 }
 
@@ -405,22 +421,46 @@ int shapelet_polar(int n1, int n2, int p, int q, double z[2])
 }
 
 /*
+ * Krawtchouk rows of block n, row p = 0..n/2 holding (1+z)^p (1-z)^(n-p), made from those of
+ * block n-1 in place: exact.
+ */
+struct blocks {
+    int64_t k[SHAPELET_ROTMAX / 2 + 1][SHAPELET_ROTMAX + 2];
+};
+
+static void next_block(int n, struct blocks *s)
+{
+    if (n == 0) {
+        memset(s, 0, sizeof *s);
+        s->k[0][0] = 1;
+        return;
+    }
+    if (n % 2 == 0)             /* the new row p = n/2 is row p-1 of block n-1 times 1+z */
+        for (int i = n; i >= 0; i--)
+            s->k[n / 2][i] = s->k[n / 2 - 1][i] + (i ? s->k[n / 2 - 1][i - 1] : 0);
+    for (int p = 0; p <= (n - 1) / 2; p++)
+        for (int i = n; i > 0; i--)
+            s->k[p][i] -= s->k[p][i - 1];
+}
+
+/*
  * Block n of the polar transform without its phases: row p = 0..n/2 (m = n - 2p >= 0),
  * column n2 = 0..n, T[p][n2] = s(n2) <n1 n2|p q> i^-n2 with s = + + - - for n2 = 0 1 2 3 mod 4
- * taken in, so that f = sum_even T c - i sum_odd T c.
+ * taken in, so that f = sum_even T c - i sum_odd T c.  <n1 n2|p q> i^-n2 =
+ * 2^(-n/2) (C(n,p)/C(n,n2))^(1/2) K.
  */
-static void rotation_block(int n, double *t)
+static void rotation_block(int n, const struct blocks *s, double *t)
 {
-    int64_t row[SHAPELET_ROTMAX + 1], k[SHAPELET_ROTMAX + 1];
+    int64_t row[SHAPELET_ROTMAX + 1];
+    double root[SHAPELET_ROTMAX + 1], scale[SHAPELET_ROTMAX + 1];
     binomials(n, row);
-    for (int p = 0; p <= n / 2; p++) {
-        krawtchouk(p, n - p, k);
-        for (int n2 = 0; n2 <= n; n2++) {
-            double w = sqrt(ldexp((double)row[p] / (double)row[n2], n % 2));
-            double v = ldexp(w, -(n + 1) / 2) * (double)k[n2];
-            *t++ = n2 & 2 ? -v : v;
-        }
+    for (int i = 0; i <= n; i++) {
+        root[i] = ldexp(sqrt(ldexp((double)row[i], n % 2)), -(n + 1) / 2);
+        scale[i] = (i & 2 ? -1 : 1) / sqrt((double)row[i]);
     }
+    for (int p = 0; p <= n / 2; p++)
+        for (int n2 = 0; n2 <= n; n2++)
+            *t++ = root[p] * ((double)s->k[p][n2] * scale[n2]);
 }
 
 static size_t block_count(int n)
@@ -476,8 +516,11 @@ int shapelet_rotation_table(int nmax, double *table)
 {
     if (nmax < 0 || nmax > SHAPELET_ROTMAX)
         return E_RANGE;
-    for (int n = 0; n <= nmax; table += block_count(n), n++)
-        rotation_block(n, table);
+    struct blocks s;
+    for (int n = 0; n <= nmax; table += block_count(n), n++) {
+        next_block(n, &s);
+        rotation_block(n, &s, table);
+    }
     return OK;
 }
 
@@ -496,8 +539,10 @@ int shapelet_rotate(int nmax, double rho, const double *c, double *out)
     double turn[SHAPELET_ROTMAX + 1][2], t[(SHAPELET_ROTMAX / 2 + 1) * (SHAPELET_ROTMAX + 1)];
     if (turns(nmax, rho, turn))
         return E_RANGE;
+    struct blocks s;
     for (int n = 0; n <= nmax; n++) {
-        rotation_block(n, t);
+        next_block(n, &s);
+        rotation_block(n, &s, t);
         rotate_block(n, t, (const double (*)[2])turn, c + shapelet_index(0, n), out + shapelet_index(0, n));
     }
     return OK;

@@ -139,17 +139,24 @@ int shear_matrix_coeff(int nmax, int nout, double g1, double g2, double *m)
     return OK;
 }
 
+/* Eight running sums, so that the products vectorise; elements of unlike parity are stored zeros. */
+WIDE static void multiply(size_t n, size_t in, const double *m, const double *c, double *out)
+{
+    for (size_t i = 0; i < n; i++, m += in) {
+        double part[8] = {0}, rest = 0;
+        size_t j = 0;
+        for (; j + 8 <= in; j += 8)
+            for (int k = 0; k < 8; k++)
+                part[k] += m[j + (size_t)k] * c[j + (size_t)k];
+        for (; j < in; j++)
+            rest += m[j] * c[j];
+        out[i] = ((part[0] + part[4]) + (part[1] + part[5])) + ((part[2] + part[6]) + (part[3] + part[7])) + rest;
+    }
+}
+
 void shear_apply(int nmax, int nout, const double *m, const double *c, double *out)
 {
-    const size_t in = shapelet_count(nmax);
-    for (int mo = 0; mo <= nout; mo++)
-        for (size_t i = shapelet_count(mo - 1); i < shapelet_count(mo); i++) {
-            double sum = 0;
-            for (int n = mo % 2; n <= nmax; n += 2)
-                for (size_t j = shapelet_count(n - 1); j < shapelet_count(n); j++)
-                    sum += m[i * in + j] * c[j];
-            out[i] = sum;
-        }
+    multiply(shapelet_count(nout), shapelet_count(nmax), m, c, out);
 }
 
 int shear_growth(int nmax, double g, double eps)

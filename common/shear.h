@@ -33,7 +33,7 @@ MUST_CHECK int shear_exact(int nmax, const double *c, double g1, double g2, int 
 
 /*
  * The same as a matrix, for many objects of one nmax: m[i*shapelet_count(nmax) + j],
- * i < shapelet_count(nout); shear_apply multiplies (orders of unlike parity are skipped).
+ * i < shapelet_count(nout); shear_apply multiplies.
  */
 MUST_CHECK int shear_matrix_coeff(int nmax, int nout, double g1, double g2, double *m);
 void shear_apply(int nmax, int nout, const double *m, const double *c, double *out);
