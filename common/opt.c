@@ -63,29 +63,30 @@ static int whole(const char *text, int negative_allowed, int64_t *value)
     return 0;
 }
 
-/* Levenshtein distance of short words, for "did you mean". */
+/* Edits (insert, delete, replace, swap neighbours) between short words, for "did you mean". */
 static int distance(const char *a, const char *b)
 {
-    int row[64];
-    int nb = (int)strlen(b);
-    if (nb > 60 || strlen(a) > 60)
+    enum { LONGEST = 40 };
+    int d[LONGEST + 1][LONGEST + 1];
+    const int na = (int)strlen(a), nb = (int)strlen(b);
+    if (na > LONGEST || nb > LONGEST)
         return 99;
+    for (int i = 0; i <= na; i++)
+        d[i][0] = i;
     for (int j = 0; j <= nb; j++)
-        row[j] = j;
-    for (int i = 1; a[i - 1]; i++) {
-        int diagonal = row[0];
-        row[0] = i;
+        d[0][j] = j;
+    for (int i = 1; i <= na; i++)
         for (int j = 1; j <= nb; j++) {
-            int up = row[j], best = diagonal + (a[i - 1] != b[j - 1]);
-            if (up + 1 < best)
-                best = up + 1;
-            if (row[j - 1] + 1 < best)
-                best = row[j - 1] + 1;
-            diagonal = up;
-            row[j] = best;
+            int best = d[i - 1][j - 1] + (a[i - 1] != b[j - 1]);
+            if (d[i - 1][j] + 1 < best)
+                best = d[i - 1][j] + 1;
+            if (d[i][j - 1] + 1 < best)
+                best = d[i][j - 1] + 1;
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] && d[i - 2][j - 2] + 1 < best)
+                best = d[i - 2][j - 2] + 1;
+            d[i][j] = best;
         }
-    }
-    return row[nb];
+    return d[na][nb];
 }
 
 static const char *nearest(const struct opt *own, const char *name)
@@ -511,7 +512,7 @@ static void file_out(FILE *f, const char *text)
     }
     char *joined;
     if (asprintf(&joined, "%.*s=%s", (int)(equals - text), text, base_name(equals + 1)) < 0)
-        return;
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
     word_out(f, joined);
     free(joined);
 }
@@ -582,7 +583,8 @@ char *opt_record(const struct program *prog, const struct opt *own, const struct
         fprintf(f, " --seed %llu", (unsigned long long)c->seed);
     for (int i = 0; i < c->argc; i++)
         word_out(f, base_name(c->argv[i]));
-    if (fclose(f))
+    const int failed = fflush(f) != 0 || ferror(f);
+    if (fclose(f) || failed)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
     return text;
 }

@@ -20,6 +20,7 @@ rrgshape noisy.fits cat.txt --stars stars.rrg -o shapes.txt
 cutcat shapes.txt --stars stars.rrg --snr 3 -o cut.txt
 ls >inputs
 
+to_png() { fits2png "$1" -o "$3.png" && mv "$3.png" "$3"; }
 clean_run() { # LABEL: judge the run in $st with output out, reference ref
     if [ $st -eq 0 ]; then
         cmp -s out ref || echo "$1: exit 0 with other bytes"
@@ -64,4 +65,4 @@ sweep detect detect noisy.fits
 sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
 sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
 sweep fom fom cut.txt
-sweep fits2png fits2png noisy.fits
+sweep fits2png to_png noisy.fits
