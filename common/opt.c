@@ -4,6 +4,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -479,112 +480,132 @@ int opt_given(const struct opt *own, const struct common *c, const char *name)
 
 /* ---- the HISTORY record ---- */
 
+/* Text that grows; open_memstream would lose text without a word when memory ends. */
+struct text {
+    char *s;
+    size_t n;
+};
+
+PRINTF_LIKE(2, 3) static void put(struct text *t, const char *fmt, ...)
+{
+    va_list ap, again;
+    va_start(ap, fmt);
+    va_copy(again, ap);
+    int more = vsnprintf(NULL, 0, fmt, ap);
+    va_end(ap);
+    char *s = more < 0 ? NULL : realloc(t->s, t->n + (size_t)more + 1);
+    if (!s)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    vsnprintf(s + t->n, (size_t)more + 1, fmt, again);
+    va_end(again);
+    t->s = s;
+    t->n += (size_t)more;
+}
+
 static const char *base_name(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash && slash[1] ? slash + 1 : path;
 }
 
-static void word_out(FILE *f, const char *text)
+static void word_out(struct text *t, const char *text)
 {
     static const char safe[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%[]";
     if (*text && !text[strspn(text, safe)]) {
-        fprintf(f, " %s", text);
+        put(t, " %s", text);
         return;
     }
-    fputs(" '", f);
+    put(t, " '");
     for (; *text; text++) {
         if (*text == '\'')
-            fputs("'\\''", f);
+            put(t, "'\\''");
         else
-            fputc(isprint((unsigned char)*text) ? *text : '?', f);
+            put(t, "%c", isprint((unsigned char)*text) ? *text : '?');
     }
-    fputc('\'', f);
+    put(t, "'");
 }
 
-/* A value "TYPE=FILE" keeps TYPE= and the base name. */
-static void file_out(FILE *f, const char *text)
+/* Base names: of FILE, of both files of "IMAGE,CATALOGUE", and of the file in "TYPE=FILE". */
+static void file_out(struct text *t, const char *value)
 {
-    const char *equals = strchr(text, '=');
-    if (!equals) {
-        word_out(f, base_name(text));
-        return;
-    }
-    char *joined;
-    if (asprintf(&joined, "%.*s=%s", (int)(equals - text), text, base_name(equals + 1)) < 0)
+    char *kept = strdup(value), *to = kept;
+    if (!kept)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
-    word_out(f, joined);
-    free(joined);
+    char *part = kept;
+    for (const char *from = value; *from; from++) {
+        if (*from == '/')
+            to = part;
+        else
+            *to++ = *from;
+        if (*from == ',' || *from == '=')
+            part = to;
+    }
+    *to = 0;
+    word_out(t, kept);
+    free(kept);
 }
 
-static void choice_out(FILE *f, const struct opt *o)
+static void choice_out(struct text *t, const struct opt *o)
 {
     const char *p = o->choices;
     for (int k = *(const int *)o->value; k > 0; k--)
         p = strchr(p, '|') + 1;
-    fprintf(f, " %.*s", (int)strcspn(p, "|"), p);
+    put(t, " %.*s", (int)strcspn(p, "|"), p);
 }
 
-static void value_out(FILE *f, const struct opt *o)
+static void value_out(struct text *t, const struct opt *o)
 {
     const double *pair = o->value;
     const struct opt_reals *r = o->value;
     switch (o->type) {
     case OPT_FLAG: break;
-    case OPT_LONG: fprintf(f, " %ld", *(const long *)o->value); break;
-    case OPT_REAL: fprintf(f, " %.15g", *(const double *)o->value); break;
-    case OPT_PAIR: fprintf(f, " %.15g,%.15g", pair[0], pair[1]); break;
-    case OPT_CHOICE: choice_out(f, o); break;
+    case OPT_LONG: put(t, " %ld", *(const long *)o->value); break;
+    case OPT_REAL: put(t, " %.15g", *(const double *)o->value); break;
+    case OPT_PAIR: put(t, " %.15g,%.15g", pair[0], pair[1]); break;
+    case OPT_CHOICE: choice_out(t, o); break;
     case OPT_REALS:
         for (size_t i = 0; i < r->n; i++)
-            fprintf(f, "%c%.15g", i ? ',' : ' ', r->v[i]);
+            put(t, "%c%.15g", i ? ',' : ' ', r->v[i]);
         break;
     case OPT_STR:
         if (o->in_file)
-            file_out(f, *(const char *const *)o->value);
+            file_out(t, *(const char *const *)o->value);
         else
-            word_out(f, *(const char *const *)o->value);
+            word_out(t, *(const char *const *)o->value);
         break;
     case OPT_STRS: break;
     }
 }
 
-static void own_options_out(FILE *f, const struct opt *own, const struct common *c)
+static void own_options_out(struct text *t, const struct opt *own, const struct common *c)
 {
     for (const struct opt *o = own; o->name; o++) {
         if (!opt_given(own, c, o->name))
             continue;
         if (o->type != OPT_STRS) {
-            fprintf(f, " --%s", o->name);
-            value_out(f, o);
+            put(t, " --%s", o->name);
+            value_out(t, o);
             continue;
         }
         const struct opt_strs *s = o->value;
         for (size_t i = 0; i < s->n; i++) {
-            fprintf(f, " --%s", o->name);
+            put(t, " --%s", o->name);
             if (o->in_file)
-                file_out(f, s->v[i]);
+                file_out(t, s->v[i]);
             else
-                word_out(f, s->v[i]);
+                word_out(t, s->v[i]);
         }
     }
 }
 
 char *opt_record(const struct program *prog, const struct opt *own, const struct common *c)
 {
-    char *text = NULL;
-    size_t size;
-    FILE *f = open_memstream(&text, &size);
-    if (!f)
-        die(EXIT_RUN, "%s", err_text(E_NOMEM));
-    fprintf(f, "%s %s: %s", prog->name, PIXSHEAR_VERSION, prog->name);
-    own_options_out(f, own, c);
+    struct text t = {0};
+    put(&t, "%s %s: %s", prog->name, PIXSHEAR_VERSION, prog->name);
+    own_options_out(&t, own, c);
     if (c->seed != 1)
-        fprintf(f, " --seed %llu", (unsigned long long)c->seed);
+        put(&t, " --seed %llu", (unsigned long long)c->seed);
     for (int i = 0; i < c->argc; i++)
-        word_out(f, base_name(c->argv[i]));
-    const int failed = fflush(f) != 0 || ferror(f);
-    if (fclose(f) || failed)
-        die(EXIT_RUN, "%s", err_text(E_NOMEM));
-    return text;
+        word_out(&t, base_name(c->argv[i]));
+    return t.s;
 }

@@ -20,32 +20,31 @@ rrgshape noisy.fits cat.txt --stars stars.rrg -o shapes.txt
 cutcat shapes.txt --stars stars.rrg --snr 3 -o cut.txt
 ls >inputs
 
-to_png() { fits2png "$1" -o "$3.png" && mv "$3.png" "$3"; }
 clean_run() { # LABEL: judge the run in $st with output out, reference ref
     if [ $st -eq 0 ]; then
-        cmp -s out ref || echo "$1: exit 0 with other bytes"
+        cmp -s out$ext ref$ext || echo "$1: exit 0 with other bytes"
     elif [ $st -ne 1 ]; then echo "$1: exit $st: $(head -c 200 err)"
     else
         [ "$(wc -l <err)" -eq 1 ] || echo "$1: $(wc -l <err) lines: $(head -c 200 err)"
-        [ -e out ] && echo "$1: left an output"
+        [ -e out$ext ] && echo "$1: left an output"
     fi
-    ls -A | grep -vxF -f inputs | grep -vxE 'out|ref|err|inputs|count|wrong' | sed "s/^/$1: left /"
+    ls -A | grep -vxF -f inputs | grep -vxE '(out|ref)(\.png)?|err|inputs|count|wrong' | sed "s/^/$1: left /"
 }
 
 sweep() { # NAME COMMAND...: the command writes to "out"
     local name=$1 kind n total step st; shift
-    "$@" -o ref 2>err || { fail "$name does not run: $(cat err)"; return; }
+    "$@" -o ref$ext 2>err || { fail "$name does not run: $(cat err)"; return; }
     : >wrong
     local runs=0
     for kind in malloc write read fsync rename linkat open close; do
-        rm -f out
-        FAULT_KIND=$kind FAULT_AT=0 FAULT_COUNT=count LD_PRELOAD=$so "$@" -o out 2>err
+        rm -f out$ext
+        FAULT_KIND=$kind FAULT_AT=0 FAULT_COUNT=count LD_PRELOAD=$so "$@" -o out$ext 2>err
         total=$(cat count); step=$((total / 12 + 1))
         for ((n = 1; n <= total; n += n < 6 ? 1 : step)); do
             for last in '' 1; do
-                rm -f out
+                rm -f out$ext
                 st=0
-                FAULT_KIND=$kind FAULT_AT=$n ${last:+env FAULT_LAST=1} env LD_PRELOAD=$so timeout 20 "$@" -o out >/dev/null 2>err || st=$?
+                FAULT_KIND=$kind FAULT_AT=$n ${last:+env FAULT_LAST=1} env LD_PRELOAD=$so timeout 20 "$@" -o out$ext >/dev/null 2>err || st=$?
                 clean_run "$kind $n of $total${last:+ and later}" >>wrong
                 runs=$((runs + 1))
             done
@@ -53,8 +52,9 @@ sweep() { # NAME COMMAND...: the command writes to "out"
     done
     if [ -s wrong ]; then fail "$name: $(wc -l <wrong) of $runs: $(head -4 wrong | tr '\n' ';')"
     else pass "$name: $runs faults survived"; fi
-    rm -f out ref
+    rm -f out$ext ref$ext
 }
+ext=
 sweep psfgen psfgen --pupil-grid 64 --size 32
 sweep galgen galgen --field 12 -n 30 --stars
 sweep simage simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 60,60
@@ -65,4 +65,5 @@ sweep detect detect noisy.fits
 sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
 sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
 sweep fom fom cut.txt
-sweep fits2png to_png noisy.fits
+ext=.png
+sweep fits2png fits2png noisy.fits
