@@ -40,6 +40,8 @@ static struct hdu describe(const struct fits_unit *u, int index)
 static int by_suffix(const struct fits_in *f, const char *suffix)
 {
     size_t len = strlen(suffix);
+    if (len == 0)
+        return -1;
     if (strspn(suffix, "0123456789") == len) {
         long n = len < 9 ? strtol(suffix, NULL, 10) : LONG_MAX;
         return n < f->n ? (int)n : -1;

@@ -78,6 +78,9 @@ static int set_up(struct sky *s, struct err *e)
     struct wcsprm *w = s->nwcs > 0 ? s->all : NULL;
     if (!w || w->naxis < 2)
         return E_MISSING;
+    for (int i = 0; i < 2 && (w->altlin & 2) && w->naxis == 2; i++)
+        if (w->cd[2 * i] == 0 && w->cd[2 * i + 1] == 0)    /* wcslib would put 1 degree here */
+            return err_set(e, E_DATA, "WCS: the CD matrix is singular");
     (void)wcsfix(0, NULL, w, fixed);          /* old spellings; what it cannot mend wcsset refuses */
     int st = wcsset(w);
     if (st)
@@ -237,6 +240,8 @@ int sky_set_tan(struct header *h, double scale, double crpix1, double crpix2, do
         st = header_set_str(&new, "CUNIT2", "deg", NULL);
     for (size_t i = 0; i < sizeof number / sizeof *number && st == OK; i++)
         st = header_set_double(&new, number[i].name, number[i].value, number[i].comment);
+    if (st == OK && crval2 == 90)             /* the default there would turn the field by 180 degrees */
+        st = header_set_double(&new, "LONPOLE", 180, "[deg] north is up at the pole, too");
     if (st == OK)
         st = header_set_str(&new, "RADESYS", "ICRS", NULL);
     if (st) {

@@ -1,0 +1,220 @@
+/*
+ * test_sky.c - world coordinates against the formulas written out: TAN by the
+ * unit vectors of Calabretta & Greisen (2002), SIP (Shupe et al. 2005) and TPV
+ * polynomials by hand.
+ */
+#include "check.h"
+#include "sky.h"
+#include <stdlib.h>
+#include <string.h>
+
+static const double degree = 0.017453292519943295;
+
+/* Intermediate world coordinates (deg) -> ra, dec (deg), TAN about (ra0, dec0). */
+static void untan(double xi, double eta, double ra0, double dec0, double *ra, double *dec)
+{
+    double a = ra0 * degree, d = dec0 * degree, x = xi * degree, y = eta * degree;
+    double e[3] = {-sin(a), cos(a), 0};
+    double n[3] = {-sin(d) * cos(a), -sin(d) * sin(a), cos(d)};
+    double c[3] = {cos(d) * cos(a), cos(d) * sin(a), sin(d)}, v[3];
+    for (int i = 0; i < 3; i++)
+        v[i] = c[i] + x * e[i] + y * n[i];
+    *ra = atan2(v[1], v[0]) / degree;
+    *ra += *ra < 0 ? 360 : 0;
+    *dec = atan2(v[2], hypot(v[0], v[1])) / degree;
+}
+
+static struct header tan_header(double scale, double p1, double p2, double ra, double dec)
+{
+    struct header h = {0};
+    if (sky_set_tan(&h, scale, p1, p2, ra, dec))
+        abort();
+    return h;
+}
+
+static struct sky *opened(struct header *h)
+{
+    struct sky *s;
+    struct err e = {""};
+    if (sky_open(&s, h, &e)) {
+        check_that(0, "sky_open: %s", e.text);
+        exit(1);
+    }
+    return s;
+}
+
+static void set(struct header *h, const char *key, double v)
+{
+    if (header_set_double(h, key, v, NULL))
+        abort();
+}
+
+static void test_tan(void)
+{
+    static const double place[][2] = {{150, 2.2}, {0, 0}, {359.9999, -45}, {189.2, 62.2}, {10, 89.999}, {10, -90}, {77, 90}};
+    struct check sky = check_begin("TAN: ra cos(dec), dec against unit vectors, deg");
+    struct check back = check_begin("TAN: back to the pixel");
+    for (size_t k = 0; k < sizeof place / sizeof *place; k++) {
+        double scale = k % 2 ? 0.04 : 0.16;
+        struct header h = tan_header(scale, 400.5, 300.25, place[k][0], place[k][1]);
+        struct sky *s = opened(&h);
+        double x[700], y[700], ra[700], dec[700], bx[700], by[700];
+        for (int i = 0; i < 700; i++) {
+            x[i] = -50 + 1.3 * i;
+            y[i] = 900 - 2.1 * i;
+        }
+        check_that(sky_from_pixel(s, 700, x, y, ra, dec) == OK && sky_to_pixel(s, 700, ra, dec, bx, by) == OK,
+                   "place %zu: all positions have an answer", k);
+        for (int i = 0; i < 700; i++) {
+            double r, d;
+            untan(-scale / 3600 * (x[i] + 1 - 400.5), scale / 3600 * (y[i] + 1 - 300.25), place[k][0], place[k][1], &r, &d);
+            double dr = remainder(ra[i] - r, 360) * cos(d * degree);
+            check_close(&sky, dr, 0, 1e-12);            /* 4 nano-arcsec */
+            check_close(&sky, dec[i], d, 1e-12);
+            check_close(&back, bx[i], x[i], 2e-8);      /* 360 deg eps / scale = 2e-9 px */
+            check_close(&back, by[i], y[i], 2e-8);
+        }
+        if (k == 0) {
+            check_that(fabs(sky_scale(s) - scale) < 1e-15, "scale %.17g arcsec", sky_scale(s));
+            check_that(sky_is_linear(s), "a plain TAN is linear");
+        }
+        sky_close(s);
+        header_free(&h);
+    }
+    check_end(&sky);
+    check_end(&back);
+}
+
+static void test_rotated(void)
+{
+    struct header h = tan_header(0.1, 10, 20, 150, 2.2);
+    double cd[4] = {-1.5e-5, 4e-6, 5e-6, 2e-5}, x = 33, y = 44, ra, dec, r, d;
+    set(&h, "CD1_1", cd[0]);
+    set(&h, "CD1_2", cd[1]);
+    set(&h, "CD2_1", cd[2]);
+    set(&h, "CD2_2", cd[3]);
+    struct sky *s = opened(&h);
+    struct check c = check_begin("rotated and skewed CD matrix");
+    int st = sky_from_pixel(s, 1, &x, &y, &ra, &dec);
+    untan(cd[0] * 24 + cd[1] * 25, cd[2] * 24 + cd[3] * 25, 150, 2.2, &r, &d);
+    check_close(&c, st == OK ? ra : NAN, r, 1e-12);
+    check_close(&c, dec, d, 1e-12);
+    check_close(&c, sky_scale(s), 3600 * sqrt(fabs(cd[0] * cd[3] - cd[1] * cd[2])), 1e-14);
+    check_end(&c);
+    sky_close(s);
+    header_free(&h);
+
+    h = tan_header(0.1, 10, 20, 150, 2.2);              /* the old way: CDELT and CROTA2 */
+    header_remove(&h, "CD*");
+    set(&h, "CDELT1", -2e-5);
+    set(&h, "CDELT2", 2e-5);
+    set(&h, "CROTA2", 30);
+    s = opened(&h);
+    st = sky_from_pixel(s, 1, &x, &y, &ra, &dec);
+    double cs = cos(30 * degree), sn = sin(30 * degree);
+    untan(-2e-5 * cs * 24 - 2e-5 * sn * 25, -2e-5 * sn * 24 + 2e-5 * cs * 25, 150, 2.2, &r, &d);
+    c = check_begin("CDELT and CROTA2");
+    check_close(&c, st == OK ? ra : NAN, r, 1e-12);
+    check_close(&c, dec, d, 1e-12);
+    check_end(&c);
+    sky_close(s);
+    header_free(&h);
+}
+
+static void test_distorted(void)
+{
+    double x = 130, y = 70, ra, dec, r, d, bx, by;
+    struct header h = tan_header(0.1, 10, 20, 150, 2.2);
+    if (header_set_str(&h, "CTYPE1", "RA---TAN-SIP", NULL) || header_set_str(&h, "CTYPE2", "DEC--TAN-SIP", NULL) ||
+        header_set_long(&h, "A_ORDER", 2, NULL) || header_set_long(&h, "B_ORDER", 2, NULL))
+        abort();
+    set(&h, "A_2_0", 1e-5);
+    set(&h, "A_1_1", -2e-5);
+    set(&h, "B_0_2", 3e-5);
+    struct sky *s = opened(&h);
+    double u = x + 1 - 10, v = y + 1 - 20, cd = 0.1 / 3600;
+    double f = u + 1e-5 * u * u - 2e-5 * u * v, g = v + 3e-5 * v * v;
+    int st = sky_from_pixel(s, 1, &x, &y, &ra, &dec);
+    untan(-cd * f, cd * g, 150, 2.2, &r, &d);
+    struct check c = check_begin("SIP polynomial");
+    check_close(&c, st == OK ? ra : NAN, r, 1e-12);
+    check_close(&c, dec, d, 1e-12);
+    check_end(&c);
+    c = check_begin("SIP back to the pixel");
+    st = sky_to_pixel(s, 1, &ra, &dec, &bx, &by);
+    check_close(&c, st == OK ? bx : NAN, x, 1e-6);
+    check_close(&c, by, y, 1e-6);
+    check_end(&c);
+    check_that(!sky_is_linear(s), "SIP is not linear");
+    sky_close(s);
+    if (sky_set_tan(&h, 0.1, 10, 20, 150, 2.2))
+        abort();
+    s = opened(&h);
+    check_that(sky_is_linear(s), "sky_set_tan removes the distortion that was there");
+    sky_close(s);
+    header_free(&h);
+
+    h = tan_header(0.1, 10, 20, 150, 2.2);
+    if (header_set_str(&h, "CTYPE1", "RA---TPV", NULL) || header_set_str(&h, "CTYPE2", "DEC--TPV", NULL))
+        abort();
+    set(&h, "PV1_1", 1);
+    set(&h, "PV1_4", 0.5);              /* 0.5 xi^2, deg */
+    set(&h, "PV2_1", 1);
+    set(&h, "PV2_2", 0.01);             /* 0.01 xi */
+    s = opened(&h);
+    double xi = -cd * u, eta = cd * v;
+    st = sky_from_pixel(s, 1, &x, &y, &ra, &dec);
+    untan(xi + 0.5 * xi * xi, eta + 0.01 * xi, 150, 2.2, &r, &d);
+    c = check_begin("TPV polynomial");
+    check_close(&c, st == OK ? ra : NAN, r, 1e-12);
+    check_close(&c, dec, d, 1e-12);
+    check_end(&c);
+    check_that(!sky_is_linear(s), "TPV is not linear");
+    sky_close(s);
+    header_free(&h);
+}
+
+static void test_failures(void)
+{
+    struct header h = tan_header(0.1, 10, 20, 150, 2.2);
+    struct sky *s = opened(&h);
+    double x[3] = {1, NAN, 3}, y[3] = {1, 2, INFINITY}, ra[3], dec[3];
+    check_that(sky_from_pixel(s, 3, x, y, ra, dec) == E_RANGE && isfinite(ra[0]) && isfinite(dec[0]) && isnan(ra[1]) &&
+               isnan(dec[1]) && isnan(ra[2]), "NaN and infinite positions give NaN, the others an answer");
+    double far_ra[2] = {330, 150}, far_dec[2] = {-2.2, 2.2};
+    check_that(sky_to_pixel(s, 2, far_ra, far_dec, x, y) == E_RANGE && isnan(x[0]) && isnan(y[0]) &&
+               fabs(x[1] - 9) < 1e-8, "the far side of the sky has no pixel");
+    sky_close(s);
+    header_free(&h);
+
+    struct err e = {""};
+    h = (struct header){0};
+    check_that(sky_open(&s, &h, &e) == E_MISSING && !s && e.text[0], "an empty header: %s", e.text);
+    set(&h, "PIXSCALE", 0.05);
+    check_that(sky_open(&s, &h, &e) == E_MISSING && strstr(e.text, "PIXSCALE"), "only PIXSCALE: %s", e.text);
+    set(&h, "CRVAL1", 1);
+    set(&h, "CRPIX1", 1);
+    check_that(sky_open(&s, &h, &e) == E_MISSING, "a linear axis is no sky: %s", e.text);
+    header_free(&h);
+    h = tan_header(0.1, 10, 20, 150, 2.2);
+    set(&h, "CD1_1", 0);
+    check_that(sky_open(&s, &h, &e) == E_DATA && !s, "a singular matrix: %s", e.text);
+    header_free(&h);
+    h = tan_header(0.1, 10, 20, 150, 2.2);
+    if (header_set_str(&h, "CTYPE1", "RA---XYZ", NULL))
+        abort();
+    check_that(sky_open(&s, &h, &e) == E_DATA || sky_open(&s, &h, &e) == E_MISSING, "an unknown projection: %s", e.text);
+    size_t n = h.n;
+    check_that(sky_set_tan(&h, 0, 1, 1, 1, 1) == E_RANGE && sky_set_tan(&h, NAN, 1, 1, 1, 1) == E_RANGE &&
+               sky_set_tan(&h, 1, 1, 1, 1, 91) == E_RANGE && h.n == n, "sky_set_tan refuses and leaves the header alone");
+    header_free(&h);
+}
+
+int main(void)
+{
+    test_tan();
+    test_rotated();
+    test_distorted();
+    test_failures();
+    return check_status();
+}
