@@ -221,7 +221,7 @@ int psf_read(const char *name, const struct psf_options *o, struct otf *t, struc
 {
     struct psf_info found = {0};
     struct fits_in *f = NULL;
-    int status = fits_in_open(&f, name, o->max_memory, e);
+    int status = fits_in_open(&f, name, o->max_memory > 0 ? o->max_memory : 1e15, e);
     if (status)
         return status;
     base_name(name, found.base, sizeof found.base);

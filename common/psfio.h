@@ -18,7 +18,7 @@ struct psf_options {
     double cutoff;         /* transform is 0 beyond |u_x|,|u_y| = cutoff, cycles/arcsec */
     int has_pixel;         /* the pixel is in, whatever PIXRESP says */
     int normalise;         /* divide by the sum */
-    double max_memory;     /* bytes */
+    double max_memory;     /* bytes; 0: no limit */
 };
 
 struct psf_info {

@@ -132,7 +132,7 @@ static void numerical(double eps, double ox, double oy)
     p.noll[0] = 4;
     bad |= pupil_otf(&p, 128, &grid, &e);
     double rms, worst = compare(&grid, &exact, &rms), h = exact.n / 2;
-    check_that(!bad && worst < 1.6e-3 && rms < 6e-5 && exact.re[(size_t)(h * exact.n + h)] == 1,
+    check_that(!bad && worst < 8e-4 && rms < 1.5e-5 && exact.re[(size_t)(h * exact.n + h)] == 1,
                "obscuration %g at (%g,%g): cells against closed form at M = 128: max %.2g rms %.2g", eps, ox, oy, worst, rms);
     otf_free(&exact);
     otf_free(&grid);
@@ -144,11 +144,11 @@ static void convergence(void)
     struct otf t[3] = {{0}};
     struct err e;
     double rms, worst;
-    int bad = pupil_otf(&p, 128, &t[0], &e) | pupil_otf(&p, 256, &t[1], &e) | pupil_otf(&p, 1024, &t[2], &e);
+    int bad = pupil_otf(&p, 64, &t[0], &e) | pupil_otf(&p, 256, &t[1], &e) | pupil_otf(&p, 1024, &t[2], &e);
     worst = compare(&t[1], &t[2], &rms);
-    check_that(!bad && worst < 1.5e-3 && rms < 3e-5, "three vanes, M = 256 against 1024: max %.3g rms %.3g", worst, rms);
+    check_that(!bad && worst < 6e-4 && rms < 1e-5, "three vanes, M = 256 against 1024: max %.3g rms %.3g", worst, rms);
     worst = compare(&t[0], &t[2], &rms);
-    check_that(worst > 1.5e-3 && worst < 3e-3, "and M = 128: max %.3g rms %.3g", worst, rms);
+    check_that(worst > 1.5e-3 && worst < 3e-3, "and M = 64: max %.3g rms %.3g", worst, rms);
     /* T from the definition: overlap of the shifted pupil on 2000 x 2000 points, along a vane and across */
     struct check c = check_begin("against counted overlaps");
     double shift[][2] = {{0.1, 0.02}, {-0.31, 0.25}, {0.5, 0.5}, {0.015625, 0}, {0, 0.75}};
