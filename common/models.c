@@ -75,7 +75,7 @@ static int fill(struct models *m, const struct table *t, const char *name, struc
     for (size_t i = 0; i < 4; i++)
         if (!table_find(t, needed[i]))
             return err_set(e, E_MISSING, "%s: no column %s: a shapelet catalogue has ID BETA NMAX MAG and last COEFFS", name, needed[i]);
-    if (!m->id || !nmax)
+    if (t->nrow && (!m->id || !nmax))
         return err_set(e, E_DATA, "%s: column %s must hold whole numbers", name, m->id ? "NMAX" : "ID");
     if (beta->type == COL_TEXT || beta->type == COL_RAGGED || (mag && mag->type == COL_TEXT))
         return err_set(e, E_DATA, "%s: column %s must hold numbers", name, mag && mag->type == COL_TEXT ? "MAG" : "BETA");

@@ -7,6 +7,7 @@
  * profiles 0.13 % and 0.6 %); knots and spiral arms make them irregular.
  */
 #include "population.h"
+#include "shapelet.h"
 #include <math.h>
 
 static const double pi = 3.14159265358979324;
@@ -239,8 +240,7 @@ int galaxy_gaussians(const struct population *p, const struct profiles *f, const
 static double series_flux(int nmax, double beta, const double *c)
 {
     double line[GAUSSIANS_NMAX + 1], sum = 0;
-    for (int n = 0; n <= nmax; n++)
-        line[n] = n == 0 ? 1.8827925275534298 : n % 2 ? 0 : line[n - 2] * sqrt((n - 1.0) / n);
+    shapelet_line_integrals(nmax, line);
     for (int n = 0; n <= nmax; n += 2)
         for (int n1 = 0; n1 <= n; n1 += 2)
             sum += c[n * (n + 1) / 2 + n1] * line[n1] * line[n - n1];

@@ -60,8 +60,10 @@ static int find_columns(struct reader *r, const struct table *t, struct columns 
         return err_set(r->e, E_MISSING, "%s: no column MAG or FLUX", r->name);
     if (!c->type)
         return err_set(r->e, E_MISSING, "%s: no column TYPE (star, shapelet, gauss or sersic)", r->name);
-    if (c->type->type != COL_TEXT && t->nrow)
+    if (t->nrow && c->type->type != COL_TEXT)
         return err_set(r->e, E_DATA, "%s: column TYPE must hold words (star, shapelet, gauss or sersic)", r->name);
+    if (t->nrow == 0)
+        return OK;
     if ((c->id && c->id->type != COL_INT) || (c->model && c->model->type != COL_INT))
         return err_set(r->e, E_DATA, "%s: column %s must hold whole numbers", r->name, c->id && c->id->type != COL_INT ? "ID" : "MODEL");
     return OK;
