@@ -1,0 +1,437 @@
+/*
+ * detect.c - find and measure the objects of an image.
+ *
+ * Background on meshes, Gaussian matched filter, threshold, deblending,
+ * cleaning, Kron photometry, star/galaxy class; a catalogue comes out.
+ */
+#include "detect.h"
+#include "detectcat.h"
+#include "header.h"
+#include "imageio.h"
+#include "opt.h"
+#include "outfile.h"
+#include "segment.h"
+#include "sky.h"
+#include "tableio.h"
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct options {
+    struct detect_params p;
+    double kernel, psf_fwhm, pixscale, zeropoint, gain, saturation;
+    int no_clean, weight_type;
+    const char *weight, *mask, *region, *columns;
+    struct opt_strs checks;
+    struct opt_reals apertures;
+};
+
+/* The image with what its header says, options first. */
+struct frame {
+    struct image im;
+    float *map;                /* rms per pixel or NULL */
+    double scale;              /* arcsec per pixel, 0 unknown */
+    double psf_fwhm;           /* arcsec, 0 unknown */
+    double zeropoint;
+    int has_zeropoint;
+    struct sky *sky;
+};
+
+static const char *const check_name[] = {"background", "rms", "filtered", "segmentation", "objects", "subtracted"};
+enum check_type { BACKGROUND, RMS, FILTERED, SEGMENTATION, OBJECTS, SUBTRACTED, CHECKS };
+
+static void run(int st, const char *what)
+{
+    if (st)
+        die(EXIT_RUN, "%s: %s", what, err_text(st));
+}
+
+/* Split TYPE=FILE; a type that does not exist is a mistake of the command line. */
+static enum check_type check_of(const char *text, const char **file)
+{
+    const char *eq = strchr(text, '=');
+    for (int i = 0; eq && eq[1] && i < CHECKS; i++)
+        if (strlen(check_name[i]) == (size_t)(eq - text) && strncmp(text, check_name[i], strlen(check_name[i])) == 0) {
+            *file = eq + 1;
+            return (enum check_type)i;
+        }
+    die(EXIT_USAGE, "--check-image %s: give TYPE=FILE with TYPE background, rms, filtered, segmentation, "
+        "objects or subtracted", text);
+}
+
+/* Read a second image of the same size. */
+static void read_beside(struct image *out, const char *name, const struct image *im, double max_memory)
+{
+    struct err e;
+    if (image_read(out, name, max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (out->nx != im->nx || out->ny != im->ny)
+        die(EXIT_RUN, "%s: %ld x %ld pixels, the image has %ld x %ld", name, out->nx, out->ny, im->nx, im->ny);
+}
+
+static void read_maps(struct frame *f, const struct options *o, const struct common *c)
+{
+    size_t n = image_count(&f->im);
+    if (o->mask) {
+        struct image mask = {0};
+        read_beside(&mask, o->mask, &f->im, c->max_memory);
+        for (size_t i = 0; i < n; i++)
+            if (mask.pix[i] > 0 || mask.pix[i] < 0 || isnan(mask.pix[i]))
+                f->im.pix[i] = NAN;
+        image_free(&mask);
+    }
+    if (o->weight) {
+        struct image w = {0};
+        read_beside(&w, o->weight, &f->im, c->max_memory);
+        detect_weights(w.pix, n, (enum weight_type)o->weight_type);
+        f->map = w.pix;
+        w.pix = NULL;
+        image_free(&w);
+    }
+}
+
+static void read_frame(struct frame *f, const char *in, const struct options *o, const struct opt *own,
+                       const struct common *c)
+{
+    struct err e;
+    if (image_read(&f->im, in, c->max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    double need = (double)image_count(&f->im) * (o->weight ? 12 : 8) + 32 * 1048576.0;
+    if (need > c->max_memory)
+        die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
+    const struct header *h = &f->im.hdr;
+    if (sky_open(&f->sky, h, &e))
+        f->sky = NULL;
+    f->scale = o->pixscale > 0 ? o->pixscale : header_double_or(h, "PIXSCALE", f->sky ? sky_scale(f->sky) : 0);
+    f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(h, "PSFFWHM", 0);
+    f->has_zeropoint = opt_given(own, c, "zeropoint") || header_double(h, "MAGZERO", &f->zeropoint) == OK;
+    if (opt_given(own, c, "zeropoint"))
+        f->zeropoint = o->zeropoint;
+    read_maps(f, o, c);
+}
+
+/* Parameters of the kernel, in pixels. */
+static struct detect_params plan(const struct frame *f, const char *in, const struct options *o,
+                                 const struct opt *own, const struct common *c)
+{
+    struct detect_params p = o->p;
+    const struct header *h = &f->im.hdr;
+    p.threads = c->threads;
+    p.clean = !o->no_clean;
+    p.phot.gain = opt_given(own, c, "gain") ? o->gain : header_double_or(h, "GAIN", 0);
+    p.phot.gain = p.phot.gain > 0 ? p.phot.gain : 0;
+    p.phot.saturation = opt_given(own, c, "saturation") ? o->saturation : header_double_or(h, "SATURATE", INFINITY);
+    p.phot.windowed = detectcat_windowed(o->columns);
+    p.kernel_fwhm = 2;
+    if (f->psf_fwhm > 0 && f->scale > 0) {
+        p.phot.psf_fwhm = f->psf_fwhm / f->scale;
+        p.kernel_fwhm = p.phot.psf_fwhm;
+    }
+    int sizes = (opt_given(own, c, "kernel") && o->kernel > 0) || o->apertures.n > 0;
+    if (sizes && !(f->scale > 0))
+        die(EXIT_RUN, "%s: no PIXSCALE and no world coordinates in the header: give --pixscale", in);
+    if (opt_given(own, c, "kernel"))
+        p.kernel_fwhm = o->kernel > 0 ? o->kernel / f->scale : 0;
+    if (p.kernel_fwhm > 1000)
+        die(EXIT_RUN, "%s: a kernel of %g pixels is more than 1000: check --kernel and the pixel scale", in, p.kernel_fwhm);
+    return p;
+}
+
+static int one_of(const struct header *h, struct table *t, const char *key)
+{
+    char text[80];
+    double v;
+    if (header_double(h, key, &v) == OK)
+        return table_set_number(t, key, v);
+    if (header_str(h, key, text, sizeof text) == OK && *text && !strpbrk(text, "\r\n"))
+        return table_set_text(t, key, text);
+    return OK;
+}
+
+/* Keywords that the next programs need, and the HISTORY of the image. */
+static void copy_keywords(struct table *t, const struct frame *f, const struct detect_params *p,
+                          const struct detection *d)
+{
+    static const char *const keys[] = {"CCDSCALE", "EXPTIME", "TOTTIME", "SHEAR1", "SHEAR2", "SETNAME", "SEED",
+                                       "FIELDID", "EXPNUM", "PSFFWHM", "PSFFILE", "CHDIFF", "NOISECOR", "SKYLEVEL",
+                                       "SKYSUB", "BUNIT", NULL};
+    const struct header *h = &f->im.hdr;
+    int st = OK;
+    if (f->scale > 0) {
+        st = table_set_number(t, "PIXSCALE", f->scale);
+        if (!st)
+            st = table_set_number(t, "AREA", (double)image_count(&f->im) * f->scale * f->scale / 3600);
+    }
+    if (!st && f->has_zeropoint)
+        st = table_set_number(t, "MAGZERO", f->zeropoint);
+    if (!st && p->phot.gain > 0)
+        st = table_set_number(t, "GAIN", p->phot.gain);
+    for (int i = 0; keys[i] && !st; i++)
+        st = one_of(h, t, keys[i]);
+    if (!st)
+        st = table_set_number(t, "SKYRMS", d->noise);
+    if (!st)
+        st = table_set_number(t, "THRESH", d->threshold * d->noise);
+    for (size_t i = 0; i < h->n && !st; i++)
+        if (strncmp(h->card[i], "HISTORY ", 8) == 0) {
+            char line[81];
+            snprintf(line, sizeof line, "%s", h->card[i] + 8);
+            for (size_t k = strlen(line); k > 0 && line[k - 1] == ' '; k--)
+                line[k - 1] = 0;
+            if (*line)
+                st = table_history(t, line);
+        }
+    run(st, "keywords");
+}
+
+/* DS9: one ellipse for each object, the one of FLUX_AUTO. */
+static void write_region(const char *name, const struct detection *d, const char *const *inputs, size_t n)
+{
+    struct err e;
+    struct outfile *f;
+    if (outfile_open(&f, name, inputs, n, &e))
+        die(EXIT_RUN, "%s", e.text);
+    char line[256];
+    int st = OK, len = snprintf(line, sizeof line, "# Region file format: DS9 version 4.1\nglobal color=green\nimage\n");
+    st = outfile_write(f, line, (size_t)len);
+    for (size_t i = 0; i < d->n && !st; i++) {
+        const struct object *o = &d->object[i];
+        len = snprintf(line, sizeof line, "ellipse(%.3f,%.3f,%.3f,%.3f,%.2f) # text={%zu}\n", o->x + 1, o->y + 1,
+                       o->a * o->kron_radius, o->b * o->kron_radius, o->theta, i + 1);
+        st = outfile_write(f, line, (size_t)len);
+    }
+    if (st) {
+        outfile_abandon(f);
+        die(EXIT_RUN, "%s: %s", name, err_text(st));
+    }
+    if (outfile_commit(f, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
+/* Row y of a check image that holds floats. */
+static int check_row(enum check_type type, const struct frame *f, const struct detect_params *p,
+                     const struct detection *d, long y, float *row)
+{
+    long nx = f->im.nx;
+    size_t at = (size_t)y * (size_t)nx;
+    if (type == FILTERED)
+        return segment_filtered(&f->im, &d->background, f->map, &d->filter, p->negative, y, 1, row);
+    if (type == RMS && f->map) {
+        memcpy(row, f->map + at, (size_t)nx * sizeof *row);
+        return OK;
+    }
+    if (type == RMS || type == BACKGROUND) {
+        const struct mesh *m = type == RMS ? &d->background.rms : &d->background.level;
+        mesh_row(m, y, 0, nx, row);
+        for (long x = 0; x < nx; x++)
+            row[x] += (float)m->pivot;
+        return OK;
+    }
+    background_subtract(&d->background, f->im.pix + at, y, 0, nx, NAN, row);
+    for (long x = 0; x < nx && type == OBJECTS; x++)
+        row[x] = d->label[at + (size_t)x] ? row[x] : 0;
+    return OK;
+}
+
+static void write_check(const char *text, const struct frame *f, const struct detect_params *p,
+                        const struct detection *d, const char *record, const char *const *inputs, size_t n)
+{
+    const char *name;
+    enum check_type type = check_of(text, &name);
+    struct err e;
+    struct header h = {0};
+    run(header_copy(&h, &f->im.hdr), name);
+    header_remove(&h, "EXTNAME");
+    if (type == SEGMENTATION)
+        header_remove(&h, "BUNIT");
+    run(header_history(&h, record), name);
+    struct fits_out *out;
+    if (fits_out_open(&out, name, inputs, n, &e))
+        die(EXIT_RUN, "%s", e.text);
+    float *row = malloc((size_t)f->im.nx * sizeof *row);
+    int st = row ? fits_out_hdu(out, type == SEGMENTATION ? 32 : -32, f->im.nx, f->im.ny, 1, &h, &e)
+                 : err_set(&e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
+    if (!st && type == SEGMENTATION)
+        st = fits_out_rows_int(out, f->im.ny, d->label, &e);
+    for (long y = 0; y < f->im.ny && type != SEGMENTATION && !st; y++) {
+        st = check_row(type, f, p, d, y, row);
+        if (st)
+            err_set(&e, st, "%s: %s", name, err_text(st));
+        else
+            st = fits_out_rows(out, 1, row, &e);
+    }
+    free(row);
+    header_free(&h);
+    if (st) {
+        fits_out_abandon(out);
+        die(EXIT_RUN, "%s", e.text);
+    }
+    if (fits_out_commit(out, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
+static void write_catalogue(const struct frame *f, const struct options *o, const struct common *c,
+                            const struct detect_params *p, const struct detection *d, const char *record,
+                            const char *const *inputs, size_t n)
+{
+    struct table t = {0};
+    struct err e;
+    struct detectcat dc = {o->columns, f->has_zeropoint ? f->zeropoint : 0, f->scale, f->sky, o->apertures.n};
+    if (detectcat_fill(&t, d, &dc, &e))
+        die(EXIT_RUN, "%s", e.text);
+    copy_keywords(&t, f, p, d);
+    if (table_write(&t, c->out, record, inputs, n, &e))
+        die(EXIT_RUN, "%s", e.text);
+    table_free(&t);
+    if (!f->has_zeropoint && !c->quiet)
+        warn("%s: no MAGZERO in the header: magnitudes are -2.5 log10(flux); give --zeropoint", inputs[0]);
+}
+
+/* --negative: the number of false detections, a line. */
+static void write_count(const struct common *c, const struct detection *d, const char *const *inputs, size_t n)
+{
+    struct err e;
+    struct outfile *f;
+    char line[64];
+    int len = snprintf(line, sizeof line, "%zu\n", d->n);
+    if (outfile_open(&f, c->out, inputs, n, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (outfile_write(f, line, (size_t)len)) {
+        outfile_abandon(f);
+        die(EXIT_RUN, "%s: %s", c->out, err_text(E_IO));
+    }
+    if (outfile_commit(f, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
+static void detect_or_die(const struct frame *f, const char *in, const struct options *o,
+                          const struct detect_params *p, struct detection *d)
+{
+    int st = detect_run(&f->im, f->map, o->weight_type != WEIGHT_RMS, p, d);
+    if (st == E_DATA)
+        die(EXIT_RUN, "%s: no usable pixel: all are blank, masked or without weight", in);
+    if (st == E_SINGULAR)
+        die(EXIT_RUN, "%s: the background has no noise (constant image): give --rms", in);
+    run(st, in);
+}
+
+static void describe(const struct frame *f, const char *in, const struct detect_params *p)
+{
+    double mb = (double)image_count(&f->im) * (f->map ? 12 : 8) / 1e6;
+    fprintf(stderr, "detect: %s: %ld x %ld pixels of %g arcsec, kernel %.3f px, gain %g, zero point %g, "
+            "about %.0f MB and %.2f s\n", in, f->im.nx, f->im.ny, f->scale, p->kernel_fwhm, p->phot.gain,
+            f->zeropoint, mb + 8, 1.2e-8 * (double)image_count(&f->im));
+}
+
+int main(int argc, char **argv)
+{
+    struct common c = COMMON_DEFAULTS;
+    struct options o = {.p = DETECT_DEFAULTS};
+    const struct program prog = {
+        "detect", "find and measure the objects of an image", "[IMAGE]", 0, 1,
+        "  detect field.fits -o field.cat\n"
+        "  detect --kernel 0.12 --threshold 1.5 --threshold-noise pixel --region field.reg field.fits -o field.cat\n"
+    };
+    const struct opt own[] = {
+        {.name = "kernel", .letter = 'k', .type = OPT_REAL, .value = &o.kernel, .lo = 0, .hi = 1e5, .arg = "ARCSEC",
+         .help = "FWHM of the Gaussian filter, 0 none (default: PSFFWHM, else 2 pixels)"},
+        {.name = "threshold", .letter = 't', .type = OPT_REAL, .value = &o.p.threshold, .lo = 1e-6, .hi = 1e9, .arg = "K",
+         .help = "detection threshold in units of the noise"},
+        {.name = "threshold-noise", .type = OPT_CHOICE, .value = &o.p.pixel_noise, .choices = "filtered|pixel",
+         .arg = "WHICH", .help = "which noise: of the filtered image or of a pixel"},
+        {.name = "min-area", .type = OPT_LONG, .value = &o.p.min_area, .lo = 1, .hi = 1e9, .arg = "N",
+         .help = "least number of pixels above the threshold"},
+        {.name = "deblend-levels", .type = OPT_LONG, .value = &o.p.levels, .lo = 1, .hi = 1024, .arg = "N",
+         .help = "levels between threshold and peak, 1 none"},
+        {.name = "deblend-contrast", .type = OPT_REAL, .value = &o.p.contrast, .lo = 0, .hi = 1, .arg = "F",
+         .help = "least part of the flux of a branch, 1 no deblending"},
+        {.name = "no-clean", .type = OPT_FLAG, .value = &o.no_clean, .help = "keep detections in the wings of others"},
+        {.name = "clean-slope", .type = OPT_REAL, .value = &o.p.clean_beta, .lo = 0.1, .hi = 10, .arg = "BETA",
+         .help = "Moffat slope of the wings that cleaning assumes"},
+        {.name = "back-size", .letter = 'b', .type = OPT_LONG, .value = &o.p.back_cell, .lo = 4, .hi = 65535, .arg = "N",
+         .help = "side of the background cells, pixels"},
+        {.name = "back-filter", .type = OPT_LONG, .value = &o.p.back_filter, .lo = 1, .hi = 101, .arg = "N",
+         .help = "median filter over N x N cells, odd"},
+        {.name = "rms", .type = OPT_REAL, .value = &o.p.rms, .lo = 0, .hi = 1e30, .arg = "R",
+         .help = "noise of a pixel, unit of the image (default: measured)"},
+        {.name = "weight", .letter = 'w', .type = OPT_STR, .value = &o.weight, .arg = "FILE", .in_file = 1,
+         .help = "weight map of the image's size"},
+        {.name = "weight-type", .type = OPT_CHOICE, .value = &o.weight_type, .choices = "weight|rms|variance", .arg = "TYPE",
+         .help = "what it holds; weight and variance are relative, rms is absolute"},
+        {.name = "mask", .type = OPT_STR, .value = &o.mask, .arg = "FILE", .in_file = 1,
+         .help = "image whose pixels other than 0 are bad"},
+        {.name = "gain", .letter = 'g', .type = OPT_REAL, .value = &o.gain, .lo = 0, .hi = 1e30, .arg = "G",
+         .help = "electrons per unit (default: GAIN; 0: no photon noise of objects)"},
+        {.name = "zeropoint", .letter = 'z', .type = OPT_REAL, .value = &o.zeropoint, .lo = -1000, .hi = 1000, .arg = "MAG",
+         .help = "magnitude of one unit of the image (default: MAGZERO)"},
+        {.name = "pixscale", .letter = 'x', .type = OPT_REAL, .value = &o.pixscale, .lo = 0, .hi = 1e6, .arg = "ARCSEC",
+         .help = "pixel scale (default: PIXSCALE, else the world coordinates)"},
+        {.name = "psf-fwhm", .type = OPT_REAL, .value = &o.psf_fwhm, .lo = 0, .hi = 1e5, .arg = "ARCSEC",
+         .help = "FWHM of the PSF for the default kernel and STAR_PROB (default: PSFFWHM)"},
+        {.name = "saturation", .type = OPT_REAL, .value = &o.saturation, .lo = -1e30, .hi = 1e30, .arg = "LEVEL",
+         .help = "level of saturated pixels (default: SATURATE)"},
+        {.name = "apertures", .type = OPT_REALS, .value = &o.apertures, .lo = 1e-6, .hi = 1e5, .arg = "D,...",
+         .help = "diameters of circular apertures, arcsec"},
+        {.name = "flux-fraction", .type = OPT_REAL, .value = &o.p.phot.flux_fraction, .lo = 0.01, .hi = 0.99, .arg = "F",
+         .help = "part of FLUX_AUTO inside FLUX_RADIUS"},
+        {.name = "columns", .letter = 'c', .type = OPT_STR, .value = &o.columns, .arg = "LIST",
+         .help = "NAME,NAME,... instead of the default columns; +NAME,... beside them"},
+        {.name = "check-image", .type = OPT_STRS, .value = &o.checks, .arg = "TYPE=FILE",
+         .help = "background, rms, filtered, segmentation, objects or subtracted"},
+        {.name = "region", .type = OPT_STR, .value = &o.region, .arg = "FILE", .in_file = 1,
+         .help = "ellipses for DS9"},
+        {.name = "negative", .type = OPT_FLAG, .value = &o.p.negative,
+         .help = "detect on the negated image and print only the count"},
+        {0}
+    };
+    opt_parse(&prog, own, &c, argc, argv);
+    const char *in = c.argv[0], *file, *inputs[3] = {in};
+    size_t n_inputs = 1;
+    if (o.p.back_filter % 2 == 0)
+        die(EXIT_USAGE, "--back-filter %ld: give an odd number", o.p.back_filter);
+    for (size_t i = 0; i < o.checks.n; i++)
+        check_of(o.checks.v[i], &file);
+    if (o.weight)
+        inputs[n_inputs++] = o.weight;
+    if (o.mask)
+        inputs[n_inputs++] = o.mask;
+
+    struct frame f = {0};
+    struct detection d = {0};
+    read_frame(&f, in, &o, own, &c);
+    struct detect_params p = plan(&f, in, &o, own, &c);
+    double *diameter = calloc(o.apertures.n + 1, sizeof *diameter);
+    if (!diameter)
+        run(E_NOMEM, in);
+    for (size_t i = 0; i < o.apertures.n; i++)
+        diameter[i] = o.apertures.v[i] / f.scale;
+    p.phot.napertures = o.apertures.n;
+    p.phot.aperture = diameter;
+    if (c.check || c.verbose)
+        describe(&f, in, &p);
+    if (c.check)
+        return EXIT_DONE;
+
+    detect_or_die(&f, in, &o, &p, &d);
+    if (c.verbose)
+        fprintf(stderr, "detect: %s: sky %g, rms %g, threshold %g rms, filtered noise %.4f; %zu found, %zu cleaned\n", in,
+                d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned);
+    char *record = opt_record(&prog, own, &c);
+    for (size_t i = 0; i < o.checks.n; i++)
+        write_check(o.checks.v[i], &f, &p, &d, record, inputs, n_inputs);
+    if (o.region && !p.negative)
+        write_region(o.region, &d, inputs, n_inputs);
+    if (p.negative)
+        write_count(&c, &d, inputs, n_inputs);
+    else
+        write_catalogue(&f, &o, &c, &p, &d, record, inputs, n_inputs);
+    free(record);
+    free(diameter);
+    detection_free(&d);
+    free(f.map);
+    sky_close(f.sky);
+    image_free(&f.im);
+    return EXIT_DONE;
+}

@@ -1,0 +1,576 @@
+/*
+ * background.c - sky level and noise on meshes; see background.h.
+ *
+ * Each cell is copied once into a buffer that stays in cache.  Clipped sums of
+ * a sample of it set the range of a histogram of 1024 bins over +-5 sigma; the
+ * clipping about the median and the final median, mean and rms are looked up in
+ * the histogram's running sums.  Whole-numbered data get bins of whole width,
+ * so that a bin never holds more numbers than its neighbour.
+ */
+#include "background.h"
+#include "par.h"
+#include "simd.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BINS = 1024, SAMPLE = 1024, LANES = 8 };
+
+/* Counts, and running sums below each edge: number, sum of k, sum of k^2. */
+struct histogram {
+    double lo, width;
+    uint32_t count[BINS];
+    int64_t n[BINS + 1], k[BINS + 1], kk[BINS + 1];
+};
+
+/* Number, sum and sum of squares of v[i] - pivot with |v - pivot - centre| <= reach. */
+WIDE static void clipped_sums(const float *v, long n, long step, double pivot, double centre,
+                              double reach, double out[3])
+{
+    double c[LANES] = {0}, s[LANES] = {0}, q[LANES] = {0};
+    long m = n / step / LANES * LANES;
+    for (long i = 0; i < m; i += LANES)
+        for (int j = 0; j < LANES; j++) {
+            double t = (double)v[(i + j) * step] - pivot;
+            double w = fabs(t - centre) <= reach ? 1 : 0;
+            c[j] += w;
+            s[j] += w * t;
+            q[j] += w * t * t;
+        }
+    for (long i = m; i < n / step; i++) {
+        double t = (double)v[i * step] - pivot;
+        double w = fabs(t - centre) <= reach ? 1 : 0;
+        c[0] += w;
+        s[0] += w * t;
+        q[0] += w * t * t;
+    }
+    out[0] = out[1] = out[2] = 0;
+    for (int j = 0; j < LANES; j++) {
+        out[0] += c[j];
+        out[1] += s[j];
+        out[2] += q[j];
+    }
+}
+
+/* Centre (minus pivot) and rms of a sample by 2-sigma clipping until it stands still. */
+static void rough(const float *v, long n, double pivot, double *centre, double *sigma)
+{
+    long step = n / SAMPLE > 0 ? n / SAMPLE : 1;
+    double c = 0, reach = INFINITY, s = 0;
+    for (int pass = 0; pass < 30; pass++) {
+        double sum[3];
+        clipped_sums(v, n, step, pivot, c, reach, sum);
+        if (!(sum[0] > 0))
+            break;
+        double mean = sum[1] / sum[0], var = sum[2] / sum[0] - mean * mean;
+        double now = var > 0 ? sqrt(var) : 0;
+        if (pass > 1 && now > 0.9 * s)
+            break;
+        c = mean;
+        s = now;
+        reach = 2 * s;
+        if (!(s > 0))
+            break;
+    }
+    *centre = c;
+    *sigma = s;
+}
+
+/* 1 when every value is a whole number below 2^23. */
+WIDE static int whole(const float *v, long n)
+{
+    int odd = 0;
+    for (long i = 0; i < n; i++)
+        odd |= !(fabsf(v[i]) < 8388608.0f) || (float)(int)v[i] != v[i];
+    return !odd;
+}
+
+static void histogram_fill(struct histogram *h, const float *v, long n, double centre, double sigma)
+{
+    h->width = 10 * sigma / BINS;
+    h->lo = centre - 5 * sigma;
+    if (sigma < 1e5 && whole(v, n)) {
+        h->width = ceil(h->width);
+        h->lo = floor(centre - h->width * BINS / 2) + 0.5;
+    }
+    memset(h->count, 0, sizeof h->count);
+    double scale = 1 / h->width, lo = h->lo;
+    for (long i = 0; i < n; i++) {
+        double t = ((double)v[i] - lo) * scale;
+        if (t >= 0 && t < BINS)
+            h->count[(int)t]++;
+    }
+    int64_t s0 = 0, s1 = 0, s2 = 0;
+    for (int b = 0; b < BINS; b++) {
+        h->n[b] = s0;
+        h->k[b] = s1;
+        h->kk[b] = s2;
+        int64_t c = h->count[b];
+        s0 += c;
+        s1 += c * b;
+        s2 += c * b * b;
+    }
+    h->n[BINS] = s0;
+    h->k[BINS] = s1;
+    h->kk[BINS] = s2;
+}
+
+/*
+ * Median of the bins lo..hi-1 in bin units (bin b has its centre at b): linear
+ * between the middles of neighbouring occupied bins, so that data with a coarse
+ * quantum give the same answer as if spread over it.
+ */
+static double histogram_median(const struct histogram *h, int lo, int hi)
+{
+    double half = 0.5 * (double)(h->n[lo] + h->n[hi]);
+    int a = lo, b = hi;            /* n[a] <= half < n[b], the last such a */
+    while (b - a > 1) {
+        int m = (a + b) / 2;
+        if ((double)h->n[m] <= half)
+            a = m;
+        else
+            b = m;
+    }
+    double middle = (double)h->n[a] + 0.5 * h->count[a];
+    int step = half >= middle ? 1 : -1, other = a + step;
+    while (other >= lo && other < hi && h->count[other] == 0)
+        other += step;
+    if (other < lo || other >= hi)
+        return a;
+    double there = (double)h->n[other] + 0.5 * h->count[other];
+    return a + (half - middle) / (there - middle) * (other - a);
+}
+
+static int clamp_bin(double b)
+{
+    return b < 0 ? 0 : b > BINS ? BINS : (int)b;
+}
+
+void background_clip(const float *v, long n, double gain, double *level, double *sigma)
+{
+    double pivot = (double)v[n / 2], centre, s;
+    rough(v, n, pivot, &centre, &s);
+    centre += pivot;
+    *level = centre;
+    *sigma = 0;
+    if (!(s > 8 * DBL_EPSILON * fabs(centre)))
+        return;
+    struct histogram h;
+    histogram_fill(&h, v, n, centre, s);
+
+    int lo = 0, hi = BINS;
+    double mean = 0, median = 0, rms = 0;
+    for (int pass = 0; pass < 50; pass++) {
+        double m = (double)(h.n[hi] - h.n[lo]);
+        if (!(m > 0))
+            return;
+        mean = (double)(h.k[hi] - h.k[lo]) / m;
+        double var = (double)(h.kk[hi] - h.kk[lo]) / m - mean * mean;
+        rms = var > 0 ? sqrt(var) : 0;
+        median = histogram_median(&h, lo, hi);
+        int a = clamp_bin(floor(median - 3 * rms + 0.5)), b = clamp_bin(ceil(median + 3 * rms + 0.5));
+        a = a > lo ? a : lo;
+        b = b < hi ? b : hi;
+        if ((a == lo && b == hi) || a >= b)
+            break;
+        lo = a;
+        hi = b;
+    }
+    mean = h.lo + (mean + 0.5) * h.width;
+    median = h.lo + (median + 0.5) * h.width;
+    rms *= h.width;
+    if (!(rms > 0)) {
+        *level = median;
+        return;
+    }
+    /* photon noise of level B at gain g: third moment B/g^2 puts the median B/(6 g^2 rms^2) below the mean */
+    double photon = gain > 0 ? centre / (gain * rms * rms) : 0;
+    if (photon > 0 && photon < 1.3)
+        median += (photon < 1 ? photon : 1) / (6 * gain);
+    *level = fabs(mean - median) < 0.3 * rms ? 2.5 * median - 1.5 * mean : median;
+    *sigma = rms;
+}
+
+double background_median(double *v, long n)
+{
+    long lo = 0, hi = n - 1, k = n / 2;
+    while (lo < hi) {              /* quickselect, middle pivot */
+        double p = v[lo + (hi - lo) / 2];
+        long i = lo, j = hi;
+        while (i <= j) {
+            while (v[i] < p)
+                i++;
+            while (v[j] > p)
+                j--;
+            if (i <= j) {
+                double t = v[i];
+                v[i++] = v[j];
+                v[j--] = t;
+            }
+        }
+        if (k <= j)
+            hi = j;
+        else if (k >= i)
+            lo = i;
+        else
+            break;
+    }
+    if (n % 2)
+        return v[k];
+    double below = v[0];           /* everything left of k is <= v[k] */
+    for (long i = 1; i < k; i++)
+        below = v[i] > below ? v[i] : below;
+    return below + 0.5 * (v[k] - below);
+}
+
+/* ---- the cells ---- */
+
+struct cells {
+    const struct image *im;
+    const float *rms_map;
+    const struct background_params *p;
+    long mx, my;
+    double *level, *sigma;         /* my*mx; NaN: no use */
+};
+
+/* Copy the good pixels of one cell; returns how many. */
+static long gather(const struct cells *c, long x0, long x1, long y0, long y1, float *buf)
+{
+    long n = 0;
+    for (long y = y0; y < y1; y++) {
+        const float *pix = c->im->pix + (size_t)y * (size_t)c->im->nx;
+        const float *rms = c->rms_map ? c->rms_map + (size_t)y * (size_t)c->im->nx : NULL;
+        long bad = 0;
+        for (long x = x0; x < x1; x++)
+            bad += !(fabsf(pix[x]) <= FLT_MAX) || (rms && !(rms[x] <= FLT_MAX));
+        if (!bad) {
+            memcpy(buf + n, pix + x0, (size_t)(x1 - x0) * sizeof *buf);
+            n += x1 - x0;
+            continue;
+        }
+        for (long x = x0; x < x1; x++)
+            if (fabsf(pix[x]) <= FLT_MAX && (!rms || rms[x] <= FLT_MAX))
+                buf[n++] = pix[x];
+    }
+    return n;
+}
+
+static int measure_rows(void *ctx, long begin, long end, int worker)
+{
+    (void)worker;
+    const struct cells *c = ctx;
+    long nx = c->im->nx, ny = c->im->ny;
+    size_t room = (size_t)(nx / c->mx + 1) * (size_t)(ny / c->my + 1);
+    float *buf = malloc(room * sizeof *buf);
+    if (!buf)
+        return E_NOMEM;
+    for (long j = begin; j < end; j++)
+        for (long i = 0; i < c->mx; i++) {
+            long x0 = i * nx / c->mx, x1 = (i + 1) * nx / c->mx;
+            long y0 = j * ny / c->my, y1 = (j + 1) * ny / c->my;
+            long n = gather(c, x0, x1, y0, y1, buf), at = j * c->mx + i;
+            c->level[at] = c->sigma[at] = NAN;
+            if (n > 0 && n * 4 >= (x1 - x0) * (y1 - y0))
+                background_clip(buf, n, c->p->gain, &c->level[at], &c->sigma[at]);
+            else if (n > 0 && c->mx * c->my == 1)
+                background_clip(buf, n, c->p->gain, &c->level[at], &c->sigma[at]);
+        }
+    free(buf);
+    return OK;
+}
+
+/*
+ * Give cells without a value the mean of their good neighbours, ring by ring:
+ * every pass fills the cells that touch a good one.
+ */
+static int fill_bad(double *level, double *sigma, long mx, long my)
+{
+    size_t n = (size_t)mx * (size_t)my, left = 0;
+    for (size_t i = 0; i < n; i++)
+        left += isnan(level[i]) ? 1 : 0;
+    if (left == n)
+        return E_DATA;
+    double *next = malloc(2 * n * sizeof *next);
+    if (!next)
+        return E_NOMEM;
+    while (left > 0) {
+        memcpy(next, level, n * sizeof *next);
+        memcpy(next + n, sigma, n * sizeof *next);
+        for (long j = 0; j < my; j++)
+            for (long i = 0; i < mx; i++) {
+                double s = 0, q = 0;
+                int m = 0;
+                if (!isnan(level[j * mx + i]))
+                    continue;
+                for (long v = j > 0 ? j - 1 : 0; v <= j + 1 && v < my; v++)
+                    for (long u = i > 0 ? i - 1 : 0; u <= i + 1 && u < mx; u++)
+                        if (!isnan(level[v * mx + u])) {
+                            s += level[v * mx + u];
+                            q += sigma[v * mx + u];
+                            m++;
+                        }
+                if (m) {
+                    next[j * mx + i] = s / m;
+                    next[(long)n + j * mx + i] = q / m;
+                    left--;
+                }
+            }
+        memcpy(level, next, n * sizeof *next);
+        memcpy(sigma, next + n, n * sizeof *next);
+    }
+    free(next);
+    return OK;
+}
+
+/* Median over side x side cells (cut at the border) from v into out. */
+static int median_filter(const double *v, long mx, long my, long side, double *out)
+{
+    long r = side / 2;
+    long w = 2 * r + 1 < mx ? 2 * r + 1 : mx, hgt = 2 * r + 1 < my ? 2 * r + 1 : my;
+    double *box = malloc((size_t)w * (size_t)hgt * sizeof *box);
+    if (!box)
+        return E_NOMEM;
+    for (long j = 0; j < my; j++)
+        for (long i = 0; i < mx; i++) {
+            long n = 0;
+            for (long b = j > r ? j - r : 0; b <= j + r && b < my; b++)
+                for (long a = i > r ? i - r : 0; a <= i + r && a < mx; a++)
+                    box[n++] = v[b * mx + a];
+            out[j * mx + i] = background_median(box, n);
+        }
+    free(box);
+    return OK;
+}
+
+/* ---- splines ---- */
+
+/* Second derivatives of the natural spline through n values `step` apart, unit spacing; w: n scratch. */
+static void natural(const double *v, long n, long step, double *d2, double *w)
+{
+    d2[0] = 0;
+    if (n > 1)
+        d2[(n - 1) * step] = 0;
+    if (n < 3)
+        return;
+    w[0] = 0;
+    for (long i = 1; i < n - 1; i++) {     /* d[i-1] + 4 d[i] + d[i+1] = 6 (v[i-1] - 2 v[i] + v[i+1]) */
+        double rhs = 6 * (v[(i - 1) * step] - 2 * v[i * step] + v[(i + 1) * step]);
+        double p = 4 - w[i - 1];
+        w[i] = 1 / p;
+        d2[i * step] = (rhs - d2[(i - 1) * step]) / p;
+    }
+    for (long i = n - 2; i > 0; i--)
+        d2[i * step] -= w[i] * d2[(i + 1) * step];
+}
+
+/* Node tables: values, d2/dx2, d2/dy2 of both. */
+static int mesh_new(struct mesh *m, const struct image *im, long mx, long my, const double *v,
+                    double pivot)
+{
+    size_t n = (size_t)mx * (size_t)my, side = (size_t)(mx > my ? mx : my);
+    double *node = malloc(4 * n * sizeof *node), *w = malloc(side * sizeof *w);
+    if (!node || !w) {
+        free(node);
+        free(w);
+        return E_NOMEM;
+    }
+    double *dx = node + n, *dy = node + 2 * n, *dxy = node + 3 * n;
+    for (size_t i = 0; i < n; i++)
+        node[i] = v[i] - pivot;
+    for (long j = 0; j < my; j++)
+        natural(node + j * mx, mx, 1, dx + j * mx, w);
+    for (long i = 0; i < mx; i++) {
+        natural(node + i, my, mx, dy + i, w);
+        natural(dx + i, my, mx, dxy + i, w);
+    }
+    free(w);
+    *m = (struct mesh){im->nx, im->ny, mx, my, pivot, node};
+    return OK;
+}
+
+/* The cubic on node interval [k, k+1] or a line beyond: c0 + t (c1 + t (c2 + t c3)), t from node k. */
+static void cubic(double v0, double v1, double a, double b, double c[4])
+{
+    c[0] = v0;
+    c[1] = v1 - v0 - (2 * a + b) / 6;
+    c[2] = a / 2;
+    c[3] = (b - a) / 6;
+}
+
+/* Value and x second derivative of column k at row coordinate t (nodes), into v[0..1]. */
+static void column_at(const struct mesh *m, long k, double t, double v[2])
+{
+    size_t n = (size_t)m->mx * (size_t)m->my;
+    long j = (long)floor(t);
+    int outside = t < 0 ? -1 : t > (double)(m->my - 1) ? 1 : 0;
+    j = j < 0 ? 0 : j > m->my - 2 ? m->my - 2 : j;
+    for (int part = 0; part < 2; part++) {
+        const double *f = m->node + (size_t)part * n + k, *d = f + 2 * n;
+        if (m->my == 1) {
+            v[part] = f[0];
+            continue;
+        }
+        double c[4], u = t - (double)j;
+        cubic(f[j * m->mx], f[(j + 1) * m->mx], d[j * m->mx], d[(j + 1) * m->mx], c);
+        if (outside < 0)
+            v[part] = c[0] + u * c[1];
+        else if (outside > 0)
+            v[part] = c[0] + c[1] + c[2] + c[3] + (u - 1) * (c[1] + 2 * c[2] + 3 * c[3]);
+        else
+            v[part] = c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+    }
+}
+
+/* out[i] = cubic at t0 + (first + i) dt; the same bits wherever a piece begins. */
+WIDE static void polynomial(float t0, float dt, const float c[4], int first, int n, float *restrict out)
+{
+    float c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3];
+    for (int i = 0; i < n; i++) {
+        float t = t0 + dt * (float)(first + i);
+        out[i] = c0 + t * (c1 + t * (c2 + t * c3));
+    }
+}
+
+/* First pixel whose coordinate in nodes is >= k. */
+static long first_pixel(const struct mesh *m, long k)
+{
+    return (long)ceil(((double)k + 0.5) * (double)m->nx / (double)m->mx - 0.5);
+}
+
+void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
+{
+    double ty = ((double)y + 0.5) * (double)m->my / (double)m->ny - 0.5;
+    double h = (double)m->mx / (double)m->nx;
+    long x = x0, end = x0 + n;
+    if (m->mx == 1) {
+        double v[2];
+        column_at(m, 0, ty, v);
+        for (long i = 0; i < n; i++)
+            out[i] = (float)v[0];
+        return;
+    }
+    while (x < end) {
+        double t = ((double)x + 0.5) * h - 0.5, v0[2], v1[2], c[4];
+        long k = (long)floor(t + 1e-9);
+        k = k < -1 ? -1 : k > m->mx - 1 ? m->mx - 1 : k;
+        long i = k < 0 ? 0 : k > m->mx - 2 ? m->mx - 2 : k;
+        long stop = k == m->mx - 1 ? end : first_pixel(m, k + 1);
+        stop = stop > end ? end : stop <= x ? x + 1 : stop;
+        column_at(m, i, ty, v0);
+        column_at(m, i + 1, ty, v1);
+        cubic(v0[0], v1[0], v0[1], v1[1], c);
+        if (k < 0)
+            c[2] = c[3] = 0;
+        if (k == m->mx - 1) {          /* the line at the end of the last interval */
+            double slope = c[1] + 2 * c[2] + 3 * c[3], last = c[0] + c[1] + c[2] + c[3];
+            c[0] = last - slope;
+            c[1] = slope;
+            c[2] = c[3] = 0;
+        }
+        long anchor = k < 0 ? 0 : first_pixel(m, k);
+        float f[4] = {(float)c[0], (float)c[1], (float)c[2], (float)c[3]};
+        float start = (float)(((double)anchor + 0.5) * h - 0.5 - (double)i);
+        polynomial(start, (float)h, f, (int)(x - anchor), (int)(stop - x), out + (x - x0));
+        x = stop;
+    }
+}
+
+double mesh_at(const struct mesh *m, long x, long y)
+{
+    float v;
+    mesh_row(m, y, x, 1, &v);
+    return m->pivot + (double)v;
+}
+
+/* out = finite(pix) ? (pix - pivot) - out : blank */
+WIDE static void subtract(const float *restrict pix, float pivot, float blank, long n,
+                          float *restrict out)
+{
+    for (long i = 0; i < n; i++) {
+        float v = (pix[i] - pivot) - out[i];
+        out[i] = fabsf(v) <= FLT_MAX ? v : blank;
+    }
+}
+
+void background_subtract(const struct background *b, const float *pix, long y, long x0, long n,
+                         float blank, float *out)
+{
+    mesh_row(&b->level, y, x0, n, out);
+    subtract(pix, (float)b->level.pivot, blank, n, out);
+}
+
+/* ---- all together ---- */
+
+/* Cells without noise are no sky when other cells have some. */
+static void drop_dead_cells(struct cells *c)
+{
+    size_t n = (size_t)c->mx * (size_t)c->my;
+    int alive = 0;
+    for (size_t i = 0; i < n; i++)
+        alive |= c->sigma[i] > 0;
+    for (size_t i = 0; alive && i < n; i++)
+        if (!(c->sigma[i] > 0))
+            c->level[i] = c->sigma[i] = NAN;
+}
+
+static int finish(struct background *b, struct cells *c)
+{
+    size_t n = (size_t)c->mx * (size_t)c->my;
+    double *level = malloc(3 * n * sizeof *level);
+    if (!level)
+        return E_NOMEM;
+    double *sigma = level + n, *sorted = level + 2 * n;
+    struct background out = {0};
+    int st = median_filter(c->level, c->mx, c->my, c->p->filter, level);
+    if (!st)
+        st = median_filter(c->sigma, c->mx, c->my, c->p->filter, sigma);
+    if (!st) {
+        memcpy(sorted, level, n * sizeof *sorted);
+        out.mean_level = background_median(sorted, (long)n);
+        memcpy(sorted, sigma, n * sizeof *sorted);
+        out.mean_rms = background_median(sorted, (long)n);
+        st = mesh_new(&out.level, c->im, c->mx, c->my, level, (double)(float)out.mean_level);
+    }
+    if (!st)
+        st = mesh_new(&out.rms, c->im, c->mx, c->my, sigma, (double)(float)out.mean_rms);
+    free(level);
+    if (st)
+        background_free(&out);
+    else
+        *b = out;
+    return st;
+}
+
+int background_measure(struct background *b, const struct image *im, const float *rms_map,
+                       const struct background_params *p)
+{
+    if (p->cell < 4 || p->filter < 1 || p->filter % 2 == 0 || p->threads < 1)
+        return E_RANGE;
+    struct cells c = {.im = im, .rms_map = rms_map, .p = p};
+    c.mx = (im->nx + p->cell / 2) / p->cell;
+    c.my = (im->ny + p->cell / 2) / p->cell;
+    c.mx = c.mx < 1 ? 1 : c.mx;
+    c.my = c.my < 1 ? 1 : c.my;
+    size_t n = (size_t)c.mx * (size_t)c.my;
+    c.level = malloc(2 * n * sizeof *c.level);
+    if (!c.level)
+        return E_NOMEM;
+    c.sigma = c.level + n;
+    int st = par_for(c.my, 1, p->threads, measure_rows, &c);
+    if (!st) {
+        drop_dead_cells(&c);
+        st = fill_bad(c.level, c.sigma, c.mx, c.my);
+    }
+    if (!st)
+        st = finish(b, &c);
+    free(c.level);
+    return st;
+}
+
+void background_free(struct background *b)
+{
+    free(b->level.node);
+    free(b->rms.node);
+    *b = (struct background){0};
+}

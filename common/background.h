@@ -1,0 +1,68 @@
+/*
+ * background.h - level and noise of the sky, on meshes, and their interpolation.
+ *
+ * The image is divided into mx x my cells of nearly `cell` pixels.  In each the
+ * level is 2.5 median - 1.5 mean of the pixels left by iterated clipping at
+ * 3 sigma about the median, or the median where the two differ by more than
+ * 0.3 sigma (crowded); cells without enough good pixels take their neighbours'
+ * mean, a median filter removes cells that an object fills, and a natural
+ * bicubic spline joins the cell centres (linear beyond the outermost).
+ */
+#ifndef PIXSHEAR_BACKGROUND_H
+#define PIXSHEAR_BACKGROUND_H
+
+#include "err.h"
+#include "image.h"
+
+/* A smooth function on nx x ny pixels, given at the centres of mx x my cells. */
+struct mesh {
+    long nx, ny, mx, my;
+    double pivot;          /* subtracted from the nodes, exact in float32 */
+    double *node;          /* my*mx values minus pivot, owned; then the three derivative tables */
+};
+
+struct background {
+    struct mesh level;     /* of the sky, unit of the image */
+    struct mesh rms;       /* of a pixel's noise */
+    double mean_level;     /* median over the cells */
+    double mean_rms;
+};
+
+struct background_params {
+    long cell;             /* wanted side of a cell, pixels, >= 4 */
+    long filter;           /* side of the median filter, cells, odd, 1: none */
+    double gain;           /* electrons per unit of the image, 0 unknown: the median of photon noise
+                              lies 1/6 electron below its mean and is moved there */
+    int threads;
+};
+
+/*
+ * Level and standard deviation of n values, by the clipping described above.
+ * work: room for n floats.  All values finite, n >= 1.
+ */
+void background_clip(const float *v, long n, double gain, double *level, double *sigma);
+
+/*
+ * Measure.  Pixels that are not finite do not count, nor do those where rms_map
+ * (NULL, or one value per pixel) is not finite.  E_DATA when no cell has a
+ * usable pixel.  When some cells have noise, cells without any (borders of
+ * exact zeros) count as bad.
+ */
+MUST_CHECK int background_measure(struct background *b, const struct image *im, const float *rms_map,
+                                  const struct background_params *p);
+void background_free(struct background *b);
+
+/* out[i] = map at (x0 + i, y), i < n, minus the pivot. */
+void mesh_row(const struct mesh *m, long y, long x0, long n, float *out);
+
+/* Value at one pixel, pivot included. */
+double mesh_at(const struct mesh *m, long x, long y);
+
+/* out[i] = pix[i] - level at (x0 + i, y), NaN and infinite pixels become `blank`. */
+void background_subtract(const struct background *b, const float *pix, long y, long x0, long n,
+                         float blank, float *out);
+
+/* Median of n doubles (v is reordered); mean of the middle two for even n. */
+double background_median(double *v, long n);
+
+#endif

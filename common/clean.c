@@ -1,0 +1,126 @@
+/* clean.c - spurious detections in the wings of bright objects; see clean.h. */
+#include "clean.h"
+#include <math.h>
+#include <stdlib.h>
+
+enum { CELL = 8 };
+static const double REACH = 10;            /* rms radii */
+
+struct wing {
+    double x, y, a, cxx, cxy, cyy, peak, k;
+};
+
+struct grid {
+    long mx, my;
+    int32_t *head, *next;                  /* chains of blobs by the cell of their centroid */
+};
+
+static struct wing wing_of(const struct blob *b, double beta)
+{
+    struct wing w;
+    double xx, xy, yy, a, s, theta;
+    blob_moments(b, &w.x, &w.y, &xx, &xy, &yy);
+    ellipse_axes(xx, xy, yy, &a, &s, &theta);
+    double det = xx * yy - xy * xy;
+    w.a = a;
+    w.cxx = yy / det;
+    w.cyy = xx / det;
+    w.cxy = -2 * xy / det;
+    double area = acos(-1) * sqrt(det);
+    w.peak = b->smooth_peak;
+    double edge2 = (double)b->n / area;    /* r^2 of the isophote in units of the ellipse */
+    double fall = pow(w.peak / b->threshold, 1 / beta) - 1;
+    w.k = fall > 0 ? fall / edge2 : 0;
+    return w;
+}
+
+static int grid_new(struct grid *g, const struct blob_list *list, long nx, long ny)
+{
+    g->mx = nx / CELL + 1;
+    g->my = ny / CELL + 1;
+    size_t cells = (size_t)g->mx * (size_t)g->my;
+    g->head = malloc(cells * sizeof *g->head);
+    g->next = malloc((list->n + 1) * sizeof *g->next);
+    if (!g->head || !g->next) {
+        free(g->head);
+        free(g->next);
+        return E_NOMEM;
+    }
+    for (size_t i = 0; i < cells; i++)
+        g->head[i] = -1;
+    for (size_t i = list->n; i-- > 0;) {
+        const struct blob *b = &list->blob[i];
+        long x = (long)(b->sx / b->s + b->x0), y = (long)(b->sy / b->s + b->y0);
+        long cell = y / CELL * g->mx + x / CELL;
+        g->next[i] = g->head[cell];
+        g->head[cell] = (int32_t)i;
+    }
+    return OK;
+}
+
+/* A brighter object takes its victims: fainter ones whose margin its wing exceeds. */
+static void claim(const struct blob_list *list, size_t i, double beta, const struct grid *g,
+                  int32_t *into, double *claim_of)
+{
+    const struct blob *b = &list->blob[i];
+    struct wing w = wing_of(b, beta);
+    double reach = REACH * w.a;
+    double pad = reach < 1e6 ? reach : 1e6;
+    long c0 = w.x > pad ? (long)(w.x - pad) / CELL : 0, c1 = (long)(w.x + pad) / CELL;
+    long r0 = w.y > pad ? (long)(w.y - pad) / CELL : 0, r1 = (long)(w.y + pad) / CELL;
+    c1 = c1 < g->mx ? c1 : g->mx - 1;
+    r1 = r1 < g->my ? r1 : g->my - 1;
+    for (long r = r0; r <= r1; r++)
+        for (long c = c0; c <= c1; c++)
+            for (int32_t j = g->head[r * g->mx + c]; j >= 0; j = g->next[j]) {
+                const struct blob *o = &list->blob[j];
+                if ((size_t)j == i || !(o->s < b->s || (!(o->s > b->s) && (size_t)j > i)))
+                    continue;
+                double dx = o->sx / o->s + o->x0 - w.x, dy = o->sy / o->s + o->y0 - w.y;
+                if (!(dx * dx + dy * dy < reach * reach))
+                    continue;
+                double r2 = w.cxx * dx * dx + w.cyy * dy * dy + w.cxy * dx * dy;
+                double light = w.peak * pow(1 + w.k * r2, -beta);
+                if (light > o->margin && light > claim_of[j]) {
+                    claim_of[j] = light;
+                    into[j] = (int32_t)i;
+                }
+            }
+}
+
+int clean_objects(struct blob_list *list, double beta, long nx, long ny, int32_t *into)
+{
+    if (!(beta >= 0.1 && beta <= 10))
+        return E_RANGE;
+    size_t n = list->n;
+    struct grid g;
+    double *light = calloc(n + 1, sizeof *light);
+    if (!light)
+        return E_NOMEM;
+    int st = grid_new(&g, list, nx, ny);
+    if (st) {
+        free(light);
+        return st;
+    }
+    for (size_t i = 0; i < n; i++)
+        into[i] = (int32_t)i;
+    for (size_t i = 0; i < n; i++)
+        claim(list, i, beta, &g, into, light);
+    for (size_t i = 0; i < n; i++) {       /* follow chains: each step leads to a brighter object */
+        int32_t end = into[i];
+        while (into[end] != end)
+            end = into[end];
+        for (int32_t k = (int32_t)i; k != end;) {
+            int32_t up = into[k];
+            into[k] = end;
+            k = up;
+        }
+    }
+    for (size_t i = 0; i < n; i++)
+        if (into[i] != (int32_t)i)
+            blob_merge(&list->blob[into[i]], &list->blob[i]);
+    free(g.head);
+    free(g.next);
+    free(light);
+    return OK;
+}

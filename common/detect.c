@@ -1,0 +1,344 @@
+/* detect.c - the steps of detection in their order; see detect.h. */
+#include "detect.h"
+#include "clean.h"
+#include "deblend.h"
+#include "grow.h"
+#include "par.h"
+#include "segment.h"
+#include "simd.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { COMPONENTS = 256, OBJECTS = 64, RUNS = 4096 };      /* per task */
+
+void detect_weights(float *map, size_t n, enum weight_type type)
+{
+    for (size_t i = 0; i < n; i++) {
+        float w = map[i];
+        if (!(w > 0 && w <= FLT_MAX))
+            map[i] = INFINITY;
+        else if (type != WEIGHT_RMS)
+            map[i] = type == WEIGHT_INVERSE ? 1 / sqrtf(w) : sqrtf(w);
+    }
+}
+
+/* ---- noise ---- */
+
+static void cell_box(const struct mesh *m, long i, long j, long box[4])
+{
+    box[0] = i * m->nx / m->mx;
+    box[1] = (i + 1) * m->nx / m->mx;
+    box[2] = j * m->ny / m->my;
+    box[3] = (j + 1) * m->ny / m->my;
+}
+
+/* Median over the cells of measured rms / rms of the map; 0 when there is none. */
+static int map_scale(const struct image *im, const struct background *b, const float *map, double *scale)
+{
+    const struct mesh *m = &b->rms;
+    double *ratio = malloc((size_t)m->mx * (size_t)m->my * sizeof *ratio);
+    if (!ratio)
+        return E_NOMEM;
+    long n = 0;
+    for (long j = 0; j < m->my; j++)
+        for (long i = 0; i < m->mx; i++) {
+            long box[4], good = 0;
+            double sum = 0;
+            cell_box(m, i, j, box);
+            for (long y = box[2]; y < box[3]; y++)
+                for (long x = box[0]; x < box[1]; x++) {
+                    size_t at = (size_t)y * (size_t)im->nx + (size_t)x;
+                    if (map[at] <= FLT_MAX && fabsf(im->pix[at]) <= FLT_MAX) {
+                        sum += (double)map[at] * (double)map[at];
+                        good++;
+                    }
+                }
+            double sigma = m->pivot + m->node[j * m->mx + i];
+            if (good * 4 >= (box[1] - box[0]) * (box[3] - box[2]) && sigma > 0)
+                ratio[n++] = sigma / sqrt(sum / (double)good);
+        }
+    *scale = n ? background_median(ratio, n) : 0;
+    free(ratio);
+    return OK;
+}
+
+/*
+ * rms of the filtered image over that of the pixels: the white-noise value, or
+ * what a sample of cells shows when that is more than 5 % above it (correlated noise).
+ */
+static int filtered_noise(const struct image *im, const struct background *b, const float *map,
+                          const struct smooth *filter, int negative, double noise, double *result)
+{
+    double white = smooth_noise(filter);
+    *result = white;
+    if (filter->radius == 0)
+        return OK;
+    const struct mesh *m = &b->rms;
+    long strips = m->my < 5 ? m->my : 4 + m->my / 16, tall = m->ny / m->my + 1, n = 0;
+    float *rows = malloc((size_t)tall * (size_t)im->nx * sizeof *rows);
+    float *cell = malloc((size_t)tall * (size_t)(im->nx / m->mx + 1) * sizeof *cell);
+    double *ratio = malloc((size_t)strips * (size_t)m->mx * sizeof *ratio);
+    int st = rows && cell && ratio ? OK : E_NOMEM;
+    for (long s = 0; s < strips && !st; s++) {
+        long j = (2 * s + 1) * m->my / (2 * strips), box[4];
+        cell_box(m, 0, j, box);
+        st = segment_filtered(im, b, map, filter, negative, box[2], box[3] - box[2], rows);
+        for (long i = 0; i < m->mx && !st; i++) {
+            long k = 0;
+            cell_box(m, i, j, box);
+            for (long y = box[2]; y < box[3]; y++)
+                for (long x = box[0]; x < box[1]; x++) {
+                    size_t at = (size_t)y * (size_t)im->nx + (size_t)x;
+                    float v = rows[(y - box[2]) * im->nx + x];
+                    if (fabsf(im->pix[at]) <= FLT_MAX && (!map || map[at] <= FLT_MAX))
+                        cell[k++] = map ? v / map[at] : v;
+                }
+            double level, sigma, pixel = map ? 1 : m->pivot + m->node[j * m->mx + i];
+            if (k * 4 < (box[1] - box[0]) * (box[3] - box[2]) || !(pixel > 0))
+                continue;
+            background_clip(cell, k, 0, &level, &sigma);
+            if (sigma > 0)
+                ratio[n++] = sigma / (noise > 0 ? noise : pixel);
+        }
+    }
+    if (!st && n) {
+        double measured = background_median(ratio, n);
+        *result = measured > 1.05 * white ? measured : white;
+    }
+    free(rows);
+    free(cell);
+    free(ratio);
+    return st;
+}
+
+/* ---- deblending in tasks ---- */
+
+struct split {
+    const struct segments *s;
+    const struct deblend_params *p;
+    int32_t *owner;            /* per detected pixel: object inside the task's list */
+    struct blob_list *list;    /* one per task */
+};
+
+static int split_components(void *ctx, long begin, long end, int worker)
+{
+    (void)worker;
+    struct split *t = ctx;
+    struct deblend_work *w;
+    int st = deblend_work_new(&w);
+    for (long c = begin; c < end && !st; c++)
+        st = deblend_component(t->s, (size_t)c, t->p, w, t->owner, &t->list[begin / COMPONENTS]);
+    deblend_work_free(w);
+    return st;
+}
+
+/* All lists end to end; base[task] = index of a task's first object. */
+static int join_lists(struct blob_list *all, struct blob_list *list, long n, size_t *base)
+{
+    size_t total = 0;
+    for (long i = 0; i < n; i++) {
+        base[i] = total;
+        total += list[i].n;
+    }
+    if (total > INT32_MAX - 1)
+        return E_RANGE;
+    int st = grow(&all->blob, &all->cap, total + 1, sizeof *all->blob);
+    if (st)
+        return st;
+    for (long i = 0; i < n; i++)
+        if (list[i].n)
+            memcpy(all->blob + base[i], list[i].blob, list[i].n * sizeof *all->blob);
+    all->n = total;
+    return OK;
+}
+
+struct paint {
+    const struct segments *s;
+    const int32_t *owner;
+    const size_t *base;
+    const int32_t *number;     /* per object before cleaning: its label */
+    int32_t *label;
+    long nx;
+};
+
+static int paint_runs(void *ctx, long begin, long end, int worker)
+{
+    (void)worker;
+    const struct paint *t = ctx;
+    for (long i = begin; i < end; i++) {
+        const struct run *r = &t->s->run[i];
+        const int32_t *owner = t->owner + r->at;
+        size_t base = t->base[r->component / COMPONENTS];
+        int32_t *label = t->label + (size_t)r->y * (size_t)t->nx;
+        for (int32_t x = r->x0; x < r->x1; x++)
+            label[x] = t->number[base + (size_t)owner[x - r->x0]];
+    }
+    return OK;
+}
+
+/* Clean, number the objects that stay, pack their blobs, paint the labels. */
+static int settle(const struct image *im, const struct detect_params *p, const struct segments *s,
+                  const int32_t *owner, const size_t *base, struct blob_list *all,
+                  struct detection *d)
+{
+    size_t n = all->n, kept = 0, pixels = image_count(im);
+    int32_t *number = malloc((n + 1) * sizeof *number), *into = malloc((n + 1) * sizeof *into);
+    d->label = calloc(pixels, sizeof *d->label);
+    int st = number && into && d->label ? OK : E_NOMEM;
+    if (!st && p->clean)
+        st = clean_objects(all, p->clean_beta, im->nx, im->ny, into);
+    for (size_t i = 0; i < n && !st; i++)
+        if (!p->clean || into[i] == (int32_t)i)
+            number[i] = (int32_t)++kept;
+    for (size_t i = 0; i < n && !st; i++) {
+        if (p->clean && into[i] != (int32_t)i)
+            number[i] = number[into[i]];
+        else
+            all->blob[number[i] - 1] = all->blob[i];
+    }
+    if (!st) {
+        d->found = n;
+        d->cleaned = n - kept;
+        all->n = kept;
+        struct paint t = {s, owner, base, number, d->label, im->nx};
+        st = par_for((long)s->nrun, RUNS, p->threads, paint_runs, &t);
+    }
+    free(number);
+    free(into);
+    return st;
+}
+
+/* Segments to blobs and labels. */
+static int separate(const struct image *im, const float *map, const struct detect_params *p,
+                    const struct segments *s, struct blob_list *all, struct detection *d)
+{
+    long tasks = (long)((s->ncomponent + COMPONENTS - 1) / COMPONENTS);
+    struct deblend_params dp = {
+        .levels = p->levels, .contrast = p->contrast, .min_area = p->min_area, .rms_map = map,
+        .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx
+    };
+    struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)),
+                          calloc((size_t)tasks + 1, sizeof(struct blob_list))};
+    size_t *base = malloc(((size_t)tasks + 1) * sizeof *base);
+    int st = split.owner && split.list && base ? OK : E_NOMEM;
+    if (!st)
+        st = par_for((long)s->ncomponent, COMPONENTS, p->threads, split_components, &split);
+    if (!st)
+        st = join_lists(all, split.list, tasks, base);
+    for (long i = 0; i < tasks && split.list; i++)
+        free(split.list[i].blob);
+    free(split.list);
+    if (!st)
+        st = settle(im, p, s, split.owner, base, all, d);
+    free(split.owner);
+    free(base);
+    return st;
+}
+
+/* ---- photometry in tasks ---- */
+
+struct measuring {
+    struct field f;
+    const struct blob_list *all;
+    struct detection *d;
+};
+
+static int measure_objects(void *ctx, long begin, long end, int worker)
+{
+    (void)worker;
+    struct measuring *t = ctx;
+    struct photometry_work *w;
+    int st = photometry_work_new(&w);
+    size_t m = 2 * t->f.p->napertures;
+    for (long i = begin; i < end && !st; i++)
+        st = photometry_measure(&t->f, &t->all->blob[i], (int32_t)i, w, &t->d->object[i],
+                                m ? t->d->aperture + (size_t)i * m : NULL);
+    photometry_work_free(w);
+    return st;
+}
+
+static int measure_all(const struct image *im, const float *map, const struct detect_params *p,
+                       const struct blob_list *all, struct detection *d)
+{
+    struct photometry_params phot = p->phot;
+    phot.noise = d->noise;
+    phot.rms_map = map;
+    d->n = all->n;
+    d->object = malloc((all->n + 1) * sizeof *d->object);
+    d->aperture = malloc((all->n * 2 * phot.napertures + 1) * sizeof *d->aperture);
+    if (!d->object || !d->aperture)
+        return E_NOMEM;
+    struct measuring t = {{im, &d->background, d->label, &phot}, all, d};
+    return par_for((long)all->n, OBJECTS, p->threads, measure_objects, &t);
+}
+
+/* Background, noise, filter and threshold into d. */
+static int prepare(const struct image *im, float *map, int relative, const struct detect_params *p,
+                   struct detection *d)
+{
+    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->threads};
+    int st = background_measure(&d->background, im, map, &bp);
+    if (st)
+        return st;
+    d->noise = p->rms > 0 ? p->rms : d->background.mean_rms;
+    if (map && relative) {
+        double scale;
+        st = map_scale(im, &d->background, map, &scale);
+        if (st)
+            return st;
+        if (p->rms > 0)
+            scale *= p->rms / d->background.mean_rms;
+        if (!(scale > 0))
+            return E_SINGULAR;
+        for (size_t i = 0; i < image_count(im); i++)
+            map[i] *= (float)scale;
+    }
+    if (!map && !(d->noise > 0))
+        return E_SINGULAR;
+    st = smooth_new(&d->filter, p->kernel_fwhm);
+    if (st)
+        return st;
+    d->filtered_noise = smooth_noise(&d->filter);
+    if (!p->pixel_noise)
+        st = filtered_noise(im, &d->background, map, &d->filter, p->negative, p->rms, &d->filtered_noise);
+    d->threshold = p->threshold * (p->pixel_noise ? 1 : d->filtered_noise);
+    return st;
+}
+
+int detect_run(const struct image *im, float *rms_map, int relative, const struct detect_params *p,
+               struct detection *d)
+{
+    struct detection out = {0};
+    struct segments s = {0};
+    struct blob_list all = {0};
+    int st = prepare(im, rms_map, relative, p, &out);
+    if (!st) {
+        struct segment_params sp = {out.threshold, out.noise, rms_map, p->min_area, p->negative, p->threads};
+        st = segment_find(&s, im, &out.background, &out.filter, &sp);
+    }
+    if (!st)
+        st = separate(im, rms_map, p, &s, &all, &out);
+    segment_free(&s);
+    if (!st && p->negative)
+        out.n = all.n;
+    else if (!st)
+        st = measure_all(im, rms_map, p, &all, &out);
+    free(all.blob);
+    if (st)
+        detection_free(&out);
+    else
+        *d = out;
+    return st;
+}
+
+void detection_free(struct detection *d)
+{
+    background_free(&d->background);
+    smooth_free(&d->filter);
+    free(d->object);
+    free(d->aperture);
+    free(d->label);
+    *d = (struct detection){0};
+}

@@ -1,0 +1,68 @@
+/*
+ * detect.h - from an image to measured objects: background, filter, threshold,
+ * deblending, cleaning, photometry.  Linear in pixels plus detected pixels;
+ * 8 bytes per pixel (image, labels), 4 more with a weight map, plus 12 to 40
+ * bytes for each detected pixel while objects are being separated.
+ */
+#ifndef PIXSHEAR_DETECT_H
+#define PIXSHEAR_DETECT_H
+
+#include "background.h"
+#include "err.h"
+#include "image.h"
+#include "photometry.h"
+#include "smooth.h"
+#include <stdint.h>
+
+enum weight_type { WEIGHT_INVERSE, WEIGHT_RMS, WEIGHT_VARIANCE };
+
+struct detect_params {
+    double kernel_fwhm;        /* pixels, 0: no filter */
+    double threshold;          /* in units of the noise */
+    int pixel_noise;           /* of the pixels instead of the filtered image */
+    long min_area;             /* pixels */
+    long back_cell, back_filter;
+    double rms;                /* noise per pixel when known, 0: measure */
+    long levels;               /* deblending */
+    double contrast;
+    int clean;
+    double clean_beta;
+    int negative;
+    int threads;
+    struct photometry_params phot;     /* noise and rms_map are filled in */
+};
+
+#define DETECT_DEFAULTS { \
+    .threshold = 3, .min_area = 5, .back_cell = 64, .back_filter = 3, .levels = 32, \
+    .contrast = 0.005, .clean = 1, .clean_beta = 1, .threads = 1, \
+    .phot = {.kron_factor = 2.5, .kron_min = 3.5, .saturation = INFINITY, .flux_fraction = 0.5}}
+
+struct detection {
+    struct background background;
+    struct smooth filter;
+    double noise;              /* rms of a pixel (without a map) */
+    double filtered_noise;     /* rms of the filtered image in units of the pixel's */
+    double threshold;          /* in units of the pixel's rms */
+    size_t n;
+    struct object *object;
+    double *aperture;          /* n * 2 * napertures */
+    int32_t *label;            /* nx*ny; 0 or 1 + index of the object */
+    size_t found, cleaned;     /* objects before cleaning, removed by it */
+};
+
+/*
+ * Turn a weight map into rms in place: weight^(-1/2), the value, or value^(1/2);
+ * infinite where the weight is zero, negative or not finite.
+ */
+void detect_weights(float *map, size_t n, enum weight_type type);
+
+/*
+ * Detect and measure.  rms_map: NULL, or from detect_weights(); with `relative`
+ * it is scaled in place so that its median agrees with the noise measured on
+ * the meshes.  E_DATA: no usable pixel; E_SINGULAR: no noise (constant image).
+ */
+MUST_CHECK int detect_run(const struct image *im, float *rms_map, int relative,
+                          const struct detect_params *p, struct detection *d);
+void detection_free(struct detection *d);
+
+#endif

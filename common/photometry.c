@@ -1,0 +1,621 @@
+/*
+ * photometry.c - measurements on a stamp around one object; see photometry.h.
+ *
+ * The stamp is cut once, background subtracted, neighbours and bad pixels
+ * replaced; everything else reads the stamp.
+ */
+#include "photometry.h"
+#include "grow.h"
+#include "simd.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double KRON_REACH = 6;        /* ellipse of the Kron radius, rms radii */
+static const double FWHM_SIGMA = 2.3548200450309493;
+
+struct stamp {
+    long x0, y0, nx, ny;
+    float *v;                              /* nx*ny, above background */
+    unsigned char *replaced;               /* 1: neighbour or bad, mirrored or zero */
+    int any_replaced;
+    double cx, cy;                         /* the object inside the stamp */
+};
+
+struct ring {                              /* pixels sorted by distance */
+    float v, dx, dy;
+};
+
+struct photometry_work {
+    struct stamp stamp;
+    double *line;                          /* one weight per column */
+    struct ring *ring;
+    long *start;
+    size_t cap_v, cap_replaced, cap_line, cap_ring, cap_start;
+};
+
+int photometry_work_new(struct photometry_work **w)
+{
+    *w = calloc(1, sizeof **w);
+    return *w ? OK : E_NOMEM;
+}
+
+void photometry_work_free(struct photometry_work *w)
+{
+    if (!w)
+        return;
+    free(w->stamp.v);
+    free(w->stamp.replaced);
+    free(w->line);
+    free(w->ring);
+    free(w->start);
+    free(w);
+}
+
+/* ---- the stamp ---- */
+
+static int usable(const struct field *f, size_t at, int32_t own)
+{
+    if (f->label[at] != 0 && f->label[at] != own)
+        return 0;
+    return fabsf(f->im->pix[at]) <= FLT_MAX && (!f->p->rms_map || f->p->rms_map[at] <= FLT_MAX);
+}
+
+/* Replace pixel (x, y) of the image by its mirror image at the object, or 0. */
+static float mirrored(const struct field *f, double cx, double cy, long x, long y, int32_t own)
+{
+    long mx = lround(2 * cx - (double)x), my = lround(2 * cy - (double)y);
+    if (mx < 0 || my < 0 || mx >= f->im->nx || my >= f->im->ny)
+        return 0;
+    size_t at = (size_t)my * (size_t)f->im->nx + (size_t)mx;
+    if (!usable(f, at, own))
+        return 0;
+    float v;
+    background_subtract(f->b, f->im->pix + at, my, mx, 1, 0, &v);
+    return v;
+}
+
+WIDE static int row_is_clean(const float *pix, const int32_t *label, int32_t own, long n)
+{
+    int bad = 0;
+    for (long i = 0; i < n; i++)
+        bad |= (label[i] != 0 && label[i] != own) || !(fabsf(pix[i]) <= FLT_MAX);
+    return !bad;
+}
+
+/* Cut |x - cx| <= hx, |y - cy| <= hy out of the image. */
+static int cut_stamp(const struct field *f, double cx, double cy, double hx, double hy, int32_t own,
+                     struct photometry_work *w)
+{
+    struct stamp *s = &w->stamp;
+    long nx = f->im->nx, ny = f->im->ny;
+    long x0 = cx - hx > 0 ? (long)ceil(cx - hx) : 0, y0 = cy - hy > 0 ? (long)ceil(cy - hy) : 0;
+    long x1 = cx + hx < (double)(nx - 1) ? (long)floor(cx + hx) + 1 : nx;
+    long y1 = cy + hy < (double)(ny - 1) ? (long)floor(cy + hy) + 1 : ny;
+    size_t n = (size_t)(x1 - x0) * (size_t)(y1 - y0);
+    int st = grow(&s->v, &w->cap_v, n, sizeof *s->v);
+    if (!st)
+        st = grow(&s->replaced, &w->cap_replaced, n, 1);
+    if (st)
+        return st;
+    s->x0 = x0;
+    s->y0 = y0;
+    s->nx = x1 - x0;
+    s->ny = y1 - y0;
+    s->cx = cx - (double)x0;
+    s->cy = cy - (double)y0;
+    s->any_replaced = 0;
+    memset(s->replaced, 0, n);
+    for (long y = y0; y < y1; y++) {
+        size_t at = (size_t)y * (size_t)nx + (size_t)x0;
+        float *v = s->v + (y - y0) * s->nx;
+        background_subtract(f->b, f->im->pix + at, y, x0, s->nx, 0, v);
+        if (!f->p->rms_map && row_is_clean(f->im->pix + at, f->label + at, own, s->nx))
+            continue;
+        for (long x = x0; x < x1; x++) {
+            if (usable(f, at + (size_t)(x - x0), own))
+                continue;
+            v[x - x0] = mirrored(f, cx, cy, x, y, own);
+            s->replaced[(y - y0) * s->nx + x - x0] = 1;
+            s->any_replaced = 1;
+        }
+    }
+    return OK;
+}
+
+/* ---- ellipses ---- */
+
+struct ellipse {
+    double cxx, cyy, cxy;                  /* cxx x^2 + cyy y^2 + cxy x y = r^2 */
+    double ext_x, ext_y;                   /* half sides of the box for r = 1 */
+};
+
+static struct ellipse ellipse_of(double xx, double xy, double yy)
+{
+    double det = xx * yy - xy * xy;
+    return (struct ellipse){yy / det, xx / det, -2 * xy / det, sqrt(xx), sqrt(yy)};
+}
+
+/* Columns of stamp row y inside radius r: [*a, *b). */
+static void row_range(const struct stamp *s, const struct ellipse *e, double r, long y, long *a, long *b)
+{
+    double dy = (double)y - s->cy, half = e->cxy * dy / (2 * e->cxx);
+    double d = half * half - (e->cyy * dy * dy - r * r) / e->cxx;
+    *a = *b = 0;
+    if (!(d >= 0))
+        return;
+    d = sqrt(d);
+    double lo = ceil(s->cx - half - d), hi = floor(s->cx - half + d) + 1;
+    lo = lo > 0 ? lo : 0;
+    hi = hi < (double)s->nx ? hi : (double)s->nx;
+    if (hi > lo) {
+        *a = (long)lo;
+        *b = (long)hi;
+    }
+}
+
+/* Kron's first-moment radius in rms radii, from the ellipse of 6; 0 without flux. */
+static double kron_radius(const struct stamp *s, const struct ellipse *e)
+{
+    double sum = 0, sum_r = 0;
+    for (long y = 0; y < s->ny; y++) {
+        long a, b;
+        row_range(s, e, KRON_REACH, y, &a, &b);
+        double dy = (double)y - s->cy;
+        for (long x = a; x < b; x++) {
+            double dx = (double)x - s->cx, v = (double)s->v[y * s->nx + x];
+            double r2 = e->cxx * dx * dx + e->cyy * dy * dy + e->cxy * dx * dy;
+            sum += v;
+            sum_r += v * sqrt(r2 > 0 ? r2 : 0);
+        }
+    }
+    return sum > 0 && sum_r > 0 ? sum_r / sum : 0;
+}
+
+struct aperture_sum {
+    double flux, variance;
+    long area, replaced;
+};
+
+/* Pixels whose centres are inside radius r; noise variance of the pixels alone. */
+static struct aperture_sum ellipse_sum(const struct field *f, const struct stamp *s,
+                                       const struct ellipse *e, double r)
+{
+    struct aperture_sum t = {0};
+    for (long y = 0; y < s->ny; y++) {
+        long a, b;
+        row_range(s, e, r, y, &a, &b);
+        t.area += b - a;
+        const float *v = s->v + y * s->nx;
+        const float *rms = f->p->rms_map
+                         ? f->p->rms_map + (size_t)(s->y0 + y) * (size_t)f->im->nx + (size_t)s->x0 : NULL;
+        for (long x = a; x < b; x++)
+            t.flux += (double)v[x];
+        for (long x = a; x < b && s->any_replaced; x++)
+            t.replaced += s->replaced[y * s->nx + x];
+        for (long x = a; rms && x < b; x++)
+            t.variance += rms[x] <= FLT_MAX ? (double)rms[x] * (double)rms[x] : 0;
+    }
+    if (!f->p->rms_map)
+        t.variance = (double)t.area * f->p->noise * f->p->noise;
+    return t;
+}
+
+static double flux_error(const struct field *f, double variance, double flux)
+{
+    if (f->p->gain > 0 && flux > 0)
+        variance += flux / f->p->gain;
+    return sqrt(variance);
+}
+
+/* ---- circles ---- */
+
+/* Area of the part of the circle of radius r with 0 <= x <= a, 0 <= y <= b. */
+static double quadrant(double a, double b, double r)
+{
+    if (a <= 0 || b <= 0)
+        return 0;
+    a = a < r ? a : r;
+    b = b < r ? b : r;
+    if (a * a + b * b <= r * r)
+        return a * b;
+    double xb = sqrt(r * r - b * b);       /* the arc leaves the top at xb and ends at a */
+    double arc = 0.5 * (a * sqrt(r * r - a * a > 0 ? r * r - a * a : 0) + r * r * asin(a / r > 1 ? 1 : a / r)
+                        - xb * b - r * r * asin(xb / r));
+    return xb * b + arc;
+}
+
+/* Signed: area of [0,a] x [0,b] inside the circle, negative sides count negative. */
+static double corner(double a, double b, double r)
+{
+    double s = (a < 0 ? -1 : 1) * (b < 0 ? -1 : 1);
+    return s * quadrant(fabs(a), fabs(b), r);
+}
+
+double circle_overlap(double dx, double dy, double r)
+{
+    if (!(r > 0))
+        return 0;
+    dx = fabs(dx);
+    dy = fabs(dy);
+    if ((dx + 0.5) * (dx + 0.5) + (dy + 0.5) * (dy + 0.5) <= r * r)
+        return 1;
+    double nx = dx > 0.5 ? dx - 0.5 : 0, ny = dy > 0.5 ? dy - 0.5 : 0;
+    if (nx * nx + ny * ny >= r * r)
+        return 0;
+    return corner(dx + 0.5, dy + 0.5, r) - corner(dx - 0.5, dy + 0.5, r)
+         - corner(dx + 0.5, dy - 0.5, r) + corner(dx - 0.5, dy - 0.5, r);
+}
+
+/* Exact circular aperture of radius r (pixels). */
+static struct aperture_sum circle_sum(const struct field *f, const struct stamp *s, double r)
+{
+    struct aperture_sum t = {0};
+    double area = 0;
+    for (long y = 0; y < s->ny; y++)
+        for (long x = 0; x < s->nx; x++) {
+            double w = circle_overlap((double)x - s->cx, (double)y - s->cy, r);
+            if (!(w > 0))
+                continue;
+            area += w;
+            t.flux += w * (double)s->v[y * s->nx + x];
+            if (f->p->rms_map) {
+                float rms = f->p->rms_map[(size_t)(s->y0 + y) * (size_t)f->im->nx + (size_t)(s->x0 + x)];
+                t.variance += rms <= FLT_MAX ? w * (double)rms * (double)rms : 0;
+            }
+        }
+    if (!f->p->rms_map)
+        t.variance = area * f->p->noise * f->p->noise;
+    t.area = (long)area;
+    return t;
+}
+
+/* Sort the pixels within `reach` of the object into rings of width 1: start[k]..start[k+1]-1 have floor(r) = k. */
+static int sort_rings(struct photometry_work *w, double reach, long *nring)
+{
+    const struct stamp *s = &w->stamp;
+    long rings = (long)reach + 2;
+    size_t n = (size_t)s->nx * (size_t)s->ny;
+    int st = grow(&w->ring, &w->cap_ring, n, sizeof *w->ring);
+    if (!st)
+        st = grow(&w->start, &w->cap_start, (size_t)rings + 2, sizeof *w->start);
+    if (st)
+        return st;
+    memset(w->start, 0, ((size_t)rings + 2) * sizeof *w->start);
+    for (int pass = 0; pass < 2; pass++) {
+        for (long y = 0; y < s->ny; y++)
+            for (long x = 0; x < s->nx; x++) {
+                double dx = (double)x - s->cx, dy = (double)y - s->cy, r2 = dx * dx + dy * dy;
+                if (!(r2 < (double)rings * (double)rings))
+                    continue;
+                long k = (long)sqrt(r2);
+                k = k < rings ? k : rings - 1;
+                if (pass == 0)
+                    w->start[k + 2]++;
+                else
+                    w->ring[w->start[k + 1]++] = (struct ring){s->v[y * s->nx + x], (float)dx, (float)dy};
+            }
+        for (long k = 0; pass == 0 && k < rings; k++)
+            w->start[k + 2] += w->start[k + 1];
+    }
+    *nring = rings;
+    return OK;
+}
+
+/* Flux inside radius r: `inner` is the flux of all rings below `from`, whose pixels are wholly inside. */
+static double growth(const struct photometry_work *w, long nring, double r, long from, double inner)
+{
+    double sum = inner;
+    for (long k = from; k < nring && (double)k < r + 0.75; k++)
+        for (long i = w->start[k]; i < w->start[k + 1]; i++) {
+            const struct ring *p = &w->ring[i];
+            sum += (double)p->v * circle_overlap((double)p->dx, (double)p->dy, r);
+        }
+    return sum;
+}
+
+/* Smallest radius that holds `flux`, within `reach`; reach when none does. */
+static int half_light(struct photometry_work *w, double reach, double flux, double *radius)
+{
+    long nring, from = 0;
+    int st = sort_rings(w, reach, &nring);
+    if (st)
+        return st;
+    double inner = 0, lo = 0, f_lo = 0, hi = 0, f_hi = 0;
+    while (hi < reach) {
+        lo = hi;
+        f_lo = f_hi;
+        hi = lo + 1 < reach ? lo + 1 : reach;
+        while ((double)from + 1 + 0.75 < lo) {
+            for (long i = w->start[from]; i < w->start[from + 1]; i++)
+                inner += (double)w->ring[i].v;
+            from++;
+        }
+        f_hi = growth(w, nring, hi, from, inner);
+        if (f_hi >= flux)
+            break;
+    }
+    if (!(f_hi >= flux)) {
+        *radius = reach;
+        return OK;
+    }
+    for (int i = 0; i < 40 && hi - lo > 1e-4 * hi; i++) {
+        double t = (flux - f_lo) / (f_hi - f_lo);      /* regula falsi in area, kept off the ends */
+        t = t > 0.05 ? t < 0.95 ? t : 0.95 : 0.05;
+        double r = sqrt(lo * lo + t * (hi * hi - lo * lo)), here = growth(w, nring, r, from, inner);
+        if (here >= flux) {
+            hi = r;
+            f_hi = here;
+        } else {
+            lo = r;
+            f_lo = here;
+        }
+    }
+    *radius = hi;
+    return OK;
+}
+
+/* ---- the Gaussian core ---- */
+
+/* Sums of I W, I W r^2, W^2 and first moments for W = exp(-r^2 / 2 w2), within 4 sqrt(w2). */
+static void weighted_sums(const struct stamp *s, double cx, double cy, double w2, double *line, double out[5])
+{
+    double reach = 4 * sqrt(w2);
+    long x0 = cx - reach > 0 ? (long)ceil(cx - reach) : 0, y0 = cy - reach > 0 ? (long)ceil(cy - reach) : 0;
+    long x1 = cx + reach < (double)(s->nx - 1) ? (long)floor(cx + reach) + 1 : s->nx;
+    long y1 = cy + reach < (double)(s->ny - 1) ? (long)floor(cy + reach) + 1 : s->ny;
+    for (long x = x0; x < x1; x++)
+        line[x] = exp(-0.5 * ((double)x - cx) * ((double)x - cx) / w2);
+    memset(out, 0, 5 * sizeof *out);
+    for (long y = y0; y < y1; y++) {
+        double dy = (double)y - cy, wy = exp(-0.5 * dy * dy / w2), row[4] = {0};
+        for (long x = x0; x < x1; x++) {
+            double dx = (double)x - cx, t = line[x] * (double)s->v[y * s->nx + x];
+            row[0] += t;
+            row[1] += t * dx;
+            row[2] += t * dx * dx;
+            row[3] += line[x] * line[x];
+        }
+        out[0] += wy * row[0];
+        out[1] += wy * (row[2] + row[0] * dy * dy);
+        out[2] += wy * wy * row[3];
+        out[3] += wy * row[1];
+        out[4] += wy * row[0] * dy;
+    }
+}
+
+struct core {
+    double variance;                       /* per axis, pixel^2 */
+    double sum, norm;                      /* sum I W, sum W^2: S/N = sum / (rms sqrt(norm)) */
+};
+
+/*
+ * The circular Gaussian that fits best by least squares: the width w at which
+ * the weighted second moment is w^2/2, by fixed-point steps.  0 when there is
+ * none between 0.3 px and the stamp.
+ */
+static struct core fit_core(const struct stamp *s, double cx, double cy, double start, double *line)
+{
+    double w2 = start > 0.3 ? start : 0.3, most = 0.25 * (double)(s->nx * s->nx + s->ny * s->ny);
+    for (int i = 0; i < 50; i++) {
+        double t[5];
+        weighted_sums(s, cx, cy, w2, line, t);
+        if (!(t[0] > 0 && t[1] > 0))
+            break;
+        double m = 0.5 * t[1] / t[0];              /* per axis */
+        double next = m < 0.9 * w2 ? m * w2 / (w2 - m) : 10 * w2;
+        next = next > 0.25 * w2 ? next < 4 * w2 ? next : 4 * w2 : 0.25 * w2;
+        if (fabs(next - w2) < 1e-3 * w2)
+            return (struct core){next, t[0], t[2]};
+        w2 = next;
+        if (!(w2 > 0.09 && w2 < most))
+            break;
+    }
+    return (struct core){0};
+}
+
+/*
+ * Windowed centroid (Bertin's XWIN): Gaussian of FWHM = twice the half-light
+ * radius, steps of twice the offset until it moves less than 2e-4 px.
+ */
+static void window_centroid(const struct stamp *s, double sigma, double *line, double *cx, double *cy)
+{
+    double x = s->cx, y = s->cy;
+    for (int i = 0; i < 16; i++) {
+        double t[5];
+        weighted_sums(s, x, y, sigma * sigma, line, t);
+        if (!(t[0] > 0))
+            return;
+        double dx = 2 * t[3] / t[0], dy = 2 * t[4] / t[0];
+        x += dx;
+        y += dy;
+        if (!(fabs(x - s->cx) < 4 * sigma + 1 && fabs(y - s->cy) < 4 * sigma + 1))
+            return;
+        if (dx * dx + dy * dy < 4e-8) {
+            *cx = x;
+            *cy = y;
+            return;
+        }
+    }
+}
+
+/*
+ * Point source or not, from ln T, T the variance of the fitted Gaussian.
+ * Stars: normal about ln T0 with sigma^2 = (2/snr)^2 + 0.06^2, T0 = (FWHM/2.355)^2
+ * + 1/12 (the pixel); 2/snr is the error of ln T for the matched Gaussian in
+ * white noise.  Galaxies: a density of 0.35 per unit of ln T from T0 upwards,
+ * smoothed by the same error.  One star is expected among 30 objects of equal
+ * size where the error is large, one in 2 where it vanishes.
+ */
+double star_probability(double variance, double snr, double psf_fwhm)
+{
+    if (!(psf_fwhm > 0 && variance > 0 && snr > 0))
+        return 0.5;
+    double sigma = psf_fwhm / FWHM_SIGMA, t0 = sigma * sigma + 1 / 12.0;
+    double error2 = 4 / (snr * snr) + 0.06 * 0.06, z = log(variance / t0) / sqrt(error2);
+    double star = exp(-0.5 * z * z) / sqrt(2 * acos(-1) * error2);
+    double galaxy = 0.35 * 0.5 * erfc(-z / sqrt(2)) + 1e-12;
+    double prior = 1 / (1 + 900 / (snr * snr));
+    return prior * star / (prior * star + galaxy);
+}
+
+/* ---- all together ---- */
+
+static void from_blob(const struct field *f, const struct blob *b, struct object *o)
+{
+    blob_moments(b, &o->x, &o->y, &o->xx, &o->xy, &o->yy);
+    ellipse_axes(o->xx, o->xy, o->yy, &o->a, &o->b, &o->theta);
+    long x = lround(o->x), y = lround(o->y);
+    o->background = mesh_at(&f->b->level, x, y);
+    o->rms = mesh_at(&f->b->rms, x, y);
+    double rms = f->p->noise;
+    if (f->p->rms_map) {
+        rms = (double)f->p->rms_map[(size_t)b->ypeak * (size_t)f->im->nx + (size_t)b->xpeak];
+        o->rms = rms;
+    }
+    o->flux_iso = b->flux;
+    o->err_iso = flux_error(f, (double)b->n * rms * rms, b->flux);
+    o->area = b->n;
+    o->area_above = b->above;
+    o->peak = b->peak;
+    o->threshold = b->threshold;
+    o->xpeak = b->xpeak;
+    o->ypeak = b->ypeak;
+    o->xmin = b->xmin;
+    o->xmax = b->xmax;
+    o->ymin = b->ymin;
+    o->ymax = b->ymax;
+    o->flags = b->flags;
+    if (b->xmin == 0 || b->ymin == 0 || b->xmax == f->im->nx - 1 || b->ymax == f->im->ny - 1)
+        o->flags |= DETECT_EDGE;
+    if (b->peak + o->background >= f->p->saturation)
+        o->flags |= DETECT_SATURATED;
+    /* errors of the centroid sum f x / sum f for independent pixels of variance rms^2 + f/gain */
+    double photon = f->p->gain > 0 ? 1 / f->p->gain : 0, n = (double)b->n;
+    double v = rms * rms * n / (b->s * b->s) + photon / b->s;
+    o->err_xx = v * o->xx;
+    o->err_xy = v * o->xy;
+    o->err_yy = v * o->yy;
+}
+
+/* A bad pixel inside or next to the isophote. */
+static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
+{
+    long nx = f->im->nx, ny = f->im->ny;
+    long x0 = b->xmin > 0 ? b->xmin - 1 : 0, x1 = b->xmax + 1 < nx ? b->xmax + 1 : nx - 1;
+    long y0 = b->ymin > 0 ? b->ymin - 1 : 0, y1 = b->ymax + 1 < ny ? b->ymax + 1 : ny - 1;
+    for (long y = y0; y <= y1; y++)
+        for (long x = x0; x <= x1; x++) {
+            size_t at = (size_t)y * (size_t)nx + (size_t)x;
+            if (fabsf(f->im->pix[at]) <= FLT_MAX && (!f->p->rms_map || f->p->rms_map[at] <= FLT_MAX))
+                continue;
+            for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < ny; v++)
+                for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < nx; u++)
+                    if (f->label[(size_t)v * (size_t)nx + (size_t)u] == own)
+                        return 1;
+        }
+    return 0;
+}
+
+/* 1 when the ellipse's box leaves the image. */
+static int leaves_image(const struct field *f, const struct object *o, double hx, double hy)
+{
+    return o->x - hx < -0.5 || o->y - hy < -0.5 || o->x + hx > (double)f->im->nx - 0.5
+        || o->y + hy > (double)f->im->ny - 0.5;
+}
+
+static int measure_auto(const struct field *f, int32_t own, struct photometry_work *w, struct object *o)
+{
+    struct ellipse e = ellipse_of(o->xx, o->xy, o->yy);
+    double r = KRON_REACH;
+    int st = cut_stamp(f, o->x, o->y, r * e.ext_x, r * e.ext_y, own, w);
+    if (st)
+        return st;
+    double kron = f->p->kron_factor * kron_radius(&w->stamp, &e);
+    double most = f->p->kron_factor * KRON_REACH;
+    o->kron_radius = kron > f->p->kron_min ? kron < most ? kron : most : f->p->kron_min;
+    if (o->kron_radius > r) {
+        r = o->kron_radius;
+        st = cut_stamp(f, o->x, o->y, r * e.ext_x, r * e.ext_y, own, w);
+        if (st)
+            return st;
+    }
+    struct aperture_sum t = ellipse_sum(f, &w->stamp, &e, o->kron_radius);
+    o->flux_auto = t.flux;
+    o->err_auto = flux_error(f, t.variance, t.flux);
+    if (t.replaced * 10 > t.area)
+        o->flags |= DETECT_CROWDED;
+    if (leaves_image(f, o, o->kron_radius * e.ext_x, o->kron_radius * e.ext_y) || !(t.flux > 0))
+        o->flags |= DETECT_APERTURE;
+    return OK;
+}
+
+static int measure_sizes(const struct field *f, struct photometry_work *w, struct object *o)
+{
+    const struct stamp *s = &w->stamp;
+    o->flux_radius = sqrt(o->a * o->b);
+    o->fwhm = FWHM_SIGMA * sqrt(0.5 * (o->xx + o->yy));
+    o->star_prob = 0;
+    o->xwin = o->x;
+    o->ywin = o->y;
+    int st = OK;
+    if (o->flux_auto > 0)
+        st = half_light(w, o->kron_radius * o->a, f->p->flux_fraction * o->flux_auto, &o->flux_radius);
+    if (!st)
+        st = grow(&w->line, &w->cap_line, (size_t)s->nx, sizeof *w->line);
+    if (st)
+        return st;
+    double *line = w->line;
+    struct core c = fit_core(s, s->cx, s->cy, 0.25 * (o->xx + o->yy), line);
+    if (c.variance > 0) {
+        o->fwhm = FWHM_SIGMA * sqrt(c.variance);
+        double noise2 = o->rms * o->rms * c.norm;
+        double snr = noise2 > 0 ? c.sum / sqrt(noise2) : INFINITY;
+        o->star_prob = star_probability(c.variance, snr, f->p->psf_fwhm);
+    } else if (!(f->p->psf_fwhm > 0)) {
+        o->star_prob = 0.5;
+    }
+    if (f->p->windowed) {
+        double cx = s->cx, cy = s->cy;
+        window_centroid(s, 2 * o->flux_radius / FWHM_SIGMA, line, &cx, &cy);
+        o->xwin = cx + (double)s->x0;
+        o->ywin = cy + (double)s->y0;
+    }
+    return OK;
+}
+
+static int measure_apertures(const struct field *f, int32_t own, struct photometry_work *w,
+                             struct object *o, double *aperture)
+{
+    for (size_t k = 0; k < f->p->napertures; k++) {
+        double r = 0.5 * f->p->aperture[k];
+        int st = cut_stamp(f, o->x, o->y, r + 1, r + 1, own, w);
+        if (st)
+            return st;
+        struct aperture_sum t = circle_sum(f, &w->stamp, r);
+        aperture[2 * k] = t.flux;
+        aperture[2 * k + 1] = flux_error(f, t.variance, t.flux);
+        if (leaves_image(f, o, r, r))
+            o->flags |= DETECT_APERTURE;
+    }
+    return OK;
+}
+
+int photometry_measure(const struct field *f, const struct blob *blob, int32_t index,
+                       struct photometry_work *w, struct object *out, double *aperture)
+{
+    struct object o = {0};
+    from_blob(f, blob, &o);
+    int st = measure_auto(f, index + 1, w, &o);
+    if (!st)
+        st = measure_sizes(f, w, &o);
+    if (!st)
+        st = measure_apertures(f, index + 1, w, &o, aperture);
+    if (st)
+        return st;
+    if (touches_bad(f, blob, index + 1))
+        o.flags |= DETECT_ISOPHOTE;
+    *out = o;
+    return OK;
+}

@@ -1,0 +1,60 @@
+/*
+ * segment.h - pixels above the threshold as runs, joined into components.
+ *
+ * One pass over the image: subtract the background, filter, compare with the
+ * threshold, keep the runs.  Runs that touch (also by a corner) belong to one
+ * component, found by union-find; components below the minimum area are
+ * dropped.  Time is linear in pixels plus runs; memory beyond the image is
+ * that of the detected pixels.
+ */
+#ifndef PIXSHEAR_SEGMENT_H
+#define PIXSHEAR_SEGMENT_H
+
+#include "background.h"
+#include "err.h"
+#include "image.h"
+#include "smooth.h"
+#include <stdint.h>
+
+/* Pixels x0 <= x < x1 of row y; their values start at `at`. */
+struct run {
+    int32_t y, x0, x1;
+    int32_t component;     /* index into first[], -1: dropped */
+    size_t at;
+};
+
+struct segments {
+    size_t nrun, npix;
+    struct run *run;       /* row by row, x rising; after segment_find grouped by component */
+    float *smooth;         /* npix filtered values above background */
+    float *value;          /* npix unfiltered values above background */
+    size_t ncomponent;
+    size_t *first;         /* runs of component c: first[c] .. first[c+1]-1, in row order */
+};
+
+struct segment_params {
+    double threshold;      /* filtered value must exceed threshold * noise */
+    double noise;          /* rms per pixel where rms_map is NULL */
+    const float *rms_map;  /* rms per pixel, infinite = bad; or NULL */
+    long min_area;         /* pixels, >= 1 */
+    int negative;          /* look for minima of the image instead */
+    int threads;
+};
+
+/*
+ * Find.  Pixels that are not finite count as 0 in the filter and are never
+ * detected; outside the image is 0.
+ */
+MUST_CHECK int segment_find(struct segments *s, const struct image *im, const struct background *b,
+                            const struct smooth *filter, const struct segment_params *p);
+void segment_free(struct segments *s);
+
+/*
+ * Filtered rows y0 .. y0+n-1 above background, for check images and noise
+ * estimates: out has n * nx values.
+ */
+MUST_CHECK int segment_filtered(const struct image *im, const struct background *b,
+                                const float *rms_map, const struct smooth *filter, int negative,
+                                long y0, long n, float *out);
+
+#endif

@@ -1,0 +1,272 @@
+/*
+ * Deblending: blends of Gaussians, the contrast rule at its edge, against a
+ * slow version that labels every level anew, sums, and hard shapes.
+ */
+#include "check.h"
+#include "deblend.h"
+#include "rng.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIDE = 96 };
+
+struct scene {
+    struct image im;
+    struct segments s;
+    int32_t *owner;
+    struct blob_list list;
+};
+
+static int split(struct scene *c, double threshold, const struct deblend_params *p)
+{
+    struct background b = {0};
+    struct smooth f;
+    double node[8] = {0};
+    b.level = (struct mesh){c->im.nx, c->im.ny, 1, 1, 0, node};
+    struct segment_params sp = {threshold, 1, NULL, 1, 0, 1};
+    struct deblend_work *w;
+    if (smooth_new(&f, 0) || deblend_work_new(&w) || segment_find(&c->s, &c->im, &b, &f, &sp))
+        return 0;
+    c->owner = malloc((c->s.npix + 1) * sizeof *c->owner);
+    int good = 1;
+    for (size_t k = 0; k < c->s.ncomponent; k++)
+        good &= deblend_component(&c->s, k, p, w, c->owner, &c->list) == OK;
+    deblend_work_free(w);
+    smooth_free(&f);
+    return good;
+}
+
+static void done(struct scene *c)
+{
+    image_free(&c->im);
+    segment_free(&c->s);
+    free(c->owner);
+    free(c->list.blob);
+    *c = (struct scene){0};
+}
+
+static void add_gauss(struct image *im, double x0, double y0, double peak, double sigma)
+{
+    for (long y = 0; y < im->ny; y++)
+        for (long x = 0; x < im->nx; x++)
+            im->pix[y * im->nx + x] += (float)(peak * exp(-0.5 * (pow((double)x - x0, 2) + pow((double)y - y0, 2)) / (sigma * sigma)));
+}
+
+/* Number of objects of two Gaussians `distance` apart, the second with `ratio` of the peak. */
+static size_t pair(double distance, double ratio, double contrast)
+{
+    struct scene c = {0};
+    struct deblend_params p = {32, contrast, 5, 1, NULL, 0};
+    if (image_new(&c.im, SIDE, SIDE))
+        return 99;
+    add_gauss(&c.im, 40.3, 45.8, 100, 3);
+    add_gauss(&c.im, 40.3 + distance, 45.8, 100 * ratio, 3);
+    size_t n = split(&c, 1, &p) ? c.list.n : 99;
+    done(&c);
+    return n;
+}
+
+static void pairs(void)
+{
+    check_that(pair(0, 1, 0.005) == 1 && pair(5, 1, 0.005) == 1, "equal Gaussians without a dip stay one");
+    check_that(pair(9, 1, 0.005) == 2 && pair(14, 1, 0.005) == 2 && pair(12, 0.2, 0.005) == 2, "with a dip they are two");
+    check_that(pair(12, 1, 0.5) == 1 && pair(12, 1, 1) == 1, "contrast 0.5 and 1: one");
+    check_that(pair(12, 0.02, 0.005) == 1, "a bump of 2 %% below the contrast stays");
+}
+
+/* ---- the slow version: every level labelled anew, the tree walked from the root ---- */
+
+struct slow {
+    const float *v;
+    const struct deblend_params *p;
+    double total, level[64];
+};
+
+/* Pixels connected to `seed` above `t`: marks them `mark` in m, returns flux and count. */
+static long spread(const struct slow *s, long seed, double t, int mark, int *m, double *flux)
+{
+    static long stack[SIDE * SIDE];
+    long n = 0, top = 0;
+    stack[top++] = seed;
+    m[seed] = mark;
+    *flux = 0;
+    while (top) {
+        long a = stack[--top], x = a % SIDE, y = a / SIDE;
+        n++;
+        *flux += (double)s->v[a];
+        for (long v = y - 1; v <= y + 1; v++)
+            for (long u = x - 1; u <= x + 1; u++)
+                if (u >= 0 && v >= 0 && u < SIDE && v < SIDE && m[v * SIDE + u] != mark
+                    && s->v[v * SIDE + u] > (float)t) {
+                    m[v * SIDE + u] = mark;
+                    stack[top++] = v * SIDE + u;
+                }
+    }
+    return n;
+}
+
+/* Objects inside the branch that contains `seed` above level k: 0 when it is not split further. */
+static int count_parts(const struct slow *s, long seed, int k)
+{
+    int *in = calloc(SIDE * SIDE, sizeof *in), *sub = calloc(SIDE * SIDE, sizeof *sub);
+    int mark = 0, strong = 0, parts = 0, inner = 0;
+    double flux;
+    if (k + 1 < s->p->levels) {
+        spread(s, seed, s->level[k], 1, in, &flux);
+        for (long i = 0; i < SIDE * SIDE; i++) {
+            if (in[i] != 1 || sub[i] || !(s->v[i] > (float)s->level[k + 1]))
+                continue;
+            long n = spread(s, i, s->level[k + 1], ++mark, sub, &flux);
+            int own = count_parts(s, i, k + 1);
+            inner += own;
+            if (n >= s->p->min_area && flux - (double)(float)s->level[k + 1] * (double)n > s->p->contrast * s->total) {
+                strong++;
+                parts += own ? own : 1;
+            }
+        }
+    }
+    free(in);
+    free(sub);
+    return strong > 1 ? parts : inner;
+}
+
+static void against_slow(void)
+{
+    int good = 0, all = 0, objects = 0;
+    struct rng g = rng_stream(3, 0, RNG_TEST);
+    for (uint64_t t = 0; t < 40; t++) {
+        struct scene c = {0};
+        struct deblend_params p = {t % 2 ? 32 : 8, t % 3 ? 0.005 : 0.0005, 3, 1, NULL, 0};
+        if (image_new(&c.im, SIDE, SIDE))
+            return;
+        for (uint64_t k = 0; k < 8; k++)
+            add_gauss(&c.im, 20 + 55 * rng_uniform(&g, t, (uint32_t)(4 * k)), 20 + 55 * rng_uniform(&g, t, (uint32_t)(4 * k + 1)),
+                      pow(10, 1 + 1.5 * rng_uniform(&g, t, (uint32_t)(4 * k + 2))), 1.5 + 3 * rng_uniform(&g, t, (uint32_t)(4 * k + 3)));
+        if (t % 4 == 0)
+            for (uint64_t i = 0; i < SIDE * SIDE; i++)
+                c.im.pix[i] += 0.5f * (float)rng_normal(&g, 1000 * t * SIDE + i, 99);
+        if (!split(&c, 1, &p))
+            return;
+        struct slow s = {c.im.pix, &p, 0, {0}};
+        size_t from = 0;
+        for (size_t k = 0; k < c.s.ncomponent; k++) {
+            double peak = 0;
+            long seed = -1, n = 0;
+            s.total = 0;
+            for (size_t i = c.s.first[k]; i < c.s.first[k + 1]; i++)
+                for (long x = c.s.run[i].x0; x < c.s.run[i].x1; x++) {
+                    seed = c.s.run[i].y * SIDE + x;
+                    s.total += (double)c.im.pix[seed];
+                    peak = fmax(peak, (double)c.im.pix[seed]);
+                    n++;
+                }
+            for (int l = 0; l < p.levels; l++)
+                s.level[l] = pow(peak, (double)l / (double)p.levels);
+            int want = n > 2 * p.min_area ? count_parts(&s, seed, 0) : 0;
+            size_t got = from;
+            while (got < c.list.n && got - from < (size_t)(want ? want : 1))
+                got++;
+            objects += want ? want : 1;
+            from = got;
+        }
+        all++;
+        good += from == c.list.n;
+        done(&c);
+    }
+    check_that(good == all && objects > all, "as many objects as a slow labelling of every level: %d of %d images, %d objects", good, all, objects);
+}
+
+/* Sums over the objects of a component add up; centroids and axes of a lone Gaussian. */
+static void sums(void)
+{
+    struct scene c = {0};
+    struct deblend_params p = {32, 0.005, 5, 0.01, NULL, 0};
+    if (image_new(&c.im, SIDE, SIDE))
+        return;
+    add_gauss(&c.im, 30.25, 40.5, 100, 3);
+    add_gauss(&c.im, 45.25, 44.5, 80, 3);
+    check_that(split(&c, 0.01, &p) && c.list.n == 2, "a pair");
+    struct check t = check_begin("flux, pixels and moments of the parts and of their union");
+    double flux = 0, want = 0, mx = 0, x, y, xx, xy, yy;
+    long n = 0, on = 0;
+    for (size_t i = 0; i < SIDE * SIDE; i++)
+        if (c.im.pix[i] > 0.01f) {
+            want += (double)c.im.pix[i];
+            mx += (double)c.im.pix[i] * (double)(i % SIDE);
+            on++;
+        }
+    struct blob u = c.list.blob[0];
+    blob_merge(&u, &c.list.blob[1]);
+    for (size_t i = 0; i < 2; i++) {
+        flux += c.list.blob[i].flux;
+        n += c.list.blob[i].n;
+    }
+    check_close(&t, flux, want, 1e-9 * want);          /* sums of 3000 doubles */
+    check_close(&t, (double)n, (double)on, 0.5);
+    blob_moments(&u, &x, &y, &xx, &xy, &yy);
+    check_close(&t, x, mx / want, 1e-9);
+    check_end(&t);
+    done(&c);
+    if (image_new(&c.im, SIDE, SIDE))
+        return;
+    add_gauss(&c.im, 50.37, 40.81, 1e6, 2.5);
+    check_that(split(&c, 0.001, &p) && c.list.n == 1, "a lone Gaussian is one object");
+    struct check m = check_begin("its centroid and variances");
+    blob_moments(&c.list.blob[0], &x, &y, &xx, &xy, &yy);
+    check_close(&m, x, 50.37, 1e-6);
+    check_close(&m, y, 40.81, 1e-6);
+    check_close(&m, xx, 6.25, 1e-5);                    /* tail below 1e-9 of the peak, float32 pixels */
+    check_close(&m, yy, 6.25, 1e-5);
+    check_close(&m, xy, 0, 1e-5);
+    check_end(&m);
+    done(&c);
+    double a, b, th;
+    struct check e = check_begin("axes and angles");
+    ellipse_axes(9, 0, 4, &a, &b, &th);
+    check_close(&e, a, 3, 1e-14);
+    check_close(&e, b, 2, 1e-14);
+    check_close(&e, th, 0, 1e-14);
+    ellipse_axes(4, 0, 9, &a, &b, &th);
+    check_close(&e, th, 90, 1e-14);
+    ellipse_axes(4, -0.0, 9, &a, &b, &th);
+    check_close(&e, th, 90, 1e-14);
+    ellipse_axes(5, -1, 5, &a, &b, &th);
+    check_close(&e, th, -45, 1e-13);
+    check_end(&e);
+}
+
+/* A plateau, a checkerboard of plateaus, a spiral: no recursion, every pixel owned. */
+static void hard_shapes(void)
+{
+    for (int kind = 0; kind < 3; kind++) {
+        struct scene c = {0};
+        long nx = kind == 2 ? SIDE : 700, ny = kind == 2 ? SIDE : 500;
+        struct deblend_params p = {32, 0, 1, 1, NULL, 0};
+        if (image_new(&c.im, nx, ny))
+            return;
+        for (long y = 0; y < ny; y++)
+            for (long x = 0; x < nx; x++)
+                c.im.pix[y * nx + x] = kind == 0 ? 5 : kind == 1 ? ((x + y) % 2 ? 5 : 2) : 0;
+        for (double t = 0; kind == 2 && t < 60; t += 0.01)     /* r = 0.7 t: turns 4.4 px apart */
+            c.im.pix[lround(48 + 0.7 * t * sin(t)) * nx + lround(48 + 0.7 * t * cos(t))] = (float)(3 + sin(9 * t));
+        int good = split(&c, 1, &p);
+        long owned = 0;
+        for (size_t i = 0; i < c.list.n; i++)
+            owned += c.list.blob[i].n;
+        long on = 0;
+        for (size_t i = 0; i < image_count(&c.im); i++)
+            on += c.im.pix[i] > 1;
+        check_that(good && owned == on && c.list.n >= 1 && (kind || c.list.n == 1), "%s: %zu objects own %ld pixels",
+                   kind == 0 ? "plateau" : kind == 1 ? "checkerboard" : "spiral", c.list.n, owned);
+        done(&c);
+    }
+}
+
+int main(void)
+{
+    pairs();
+    against_slow();
+    sums();
+    hard_shapes();
+    return check_status();
+}
