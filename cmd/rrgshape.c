@@ -290,11 +290,16 @@ static void set_dstar(struct table *t, const struct starmom *s, double own, doub
 }
 
 static void write_catalogue(const struct table *t, const struct program *prog, const struct opt *own,
-                            const struct common *c)
+                            const struct params *p, const struct common *c)
 {
     struct err e;
+    const char *all[] = {c->argv[0], c->argv[1], p->stars, p->psf, p->weight, p->segmentation}, *inputs[6];
+    size_t n = 0;
+    for (size_t i = 0; i < 6; i++)
+        if (all[i])
+            inputs[n++] = all[i];
     char *record = opt_record(prog, own, c);
-    if (table_write(t, c->out, record, c->argv, (size_t)c->argc, &e))
+    if (table_write(t, c->out, record, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     free(record);
 }
@@ -389,7 +394,7 @@ int main(int argc, char **argv)
     else
         measure_objects(&in, &p, &c);
     if (!c.check)
-        write_catalogue(p.stars_only ? &curve : &in.cat, &prog, own, &c);
+        write_catalogue(p.stars_only ? &curve : &in.cat, &prog, own, &p, &c);
     table_free(&curve);
     free_input(&in);
     return EXIT_DONE;

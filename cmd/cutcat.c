@@ -1,0 +1,162 @@
+/* cutcat.c - keep the objects that are used, and count what each cut removes. */
+#include "cuts.h"
+#include "err.h"
+#include "opt.h"
+#include "shapecat.h"
+#include "tableio.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct params {
+    const char *stars;
+    int which, mark;
+    struct opt_strs where;
+};
+
+static void check(int st, const char *what)
+{
+    if (st)
+        die(EXIT_RUN, "%s: %s", what, err_text(st));
+}
+
+static double key_or_nan(const struct table *t, const char *name)
+{
+    double v;
+    return table_key_number(t, name, &v) == OK ? v : NAN;
+}
+
+/* d* in pixels from the star-moment file, else from the catalogue's own keywords. */
+static void find_dstar(struct cuts *c, struct starmom *stars, const struct params *p, const struct table *cat,
+                       double max_memory)
+{
+    const char *key = p->which == DSTAR_OWN ? "DSTAROWN" : "DSTAR";
+    struct err e;
+    c->which = (enum dstar)p->which;
+    c->dstar = key_or_nan(cat, key);
+    if (!p->stars)
+        return;
+    struct table t = {0};
+    if (table_read(&t, p->stars, max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    double ours = key_or_nan(cat, "PIXSCALE"), theirs = key_or_nan(&t, "PIXSCALE");
+    if (fabs(theirs / ours - 1) > 1e-6)
+        die(EXIT_RUN, "%s: stars for pixels of %g arcsec, but the catalogue has %g", p->stars, theirs, ours);
+    if (p->which == DSTAR_EACH) {
+        if (starmom_from_table(stars, &t, &e))
+            die(EXIT_RUN, "%s: %s", p->stars, e.text);
+        c->stars = stars;
+    } else {
+        c->dstar = key_or_nan(&t, key);
+        if (!(c->dstar > 0))
+            die(EXIT_RUN, "%s: no keyword %s: make the file with rrgshape --stars-only", p->stars, key);
+    }
+    table_free(&t);
+}
+
+static struct cut_where *parse_where(const struct opt_strs *list)
+{
+    struct err e;
+    struct cut_where *w = calloc(list->n + 1, sizeof *w);
+    if (!w)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    for (size_t i = 0; i < list->n; i++)
+        if (cut_parse(&w[i], list->v[i], &e))
+            die(EXIT_USAGE, "--where %s", e.text);
+    return w;
+}
+
+static void set_keywords(struct table *t, const struct cuts *c, const struct cut_count *n)
+{
+    const struct { const char *name; double v; } key[] = {
+        {"NDET", (double)n->all}, {"NSTARCUT", (double)n->stars}, {"NELLCUT", (double)n->ellipticity},
+        {"NSIZECUT", (double)n->size}, {"NSNRCUT", (double)n->snr}, {"NUSED", (double)n->where}};
+    for (size_t k = 0; k < sizeof key / sizeof *key; k++)
+        check(table_set_number(t, key[k].name, key[k].v), key[k].name);
+    if (c->which == DSTAR_EACH)
+        return;
+    check(table_set_number(t, "DSTAR", c->dstar), "DSTAR");
+    check(table_set_number(t, "DCUT", cuts_size(c, c->dstar)), "DCUT");
+}
+
+static void tell(const char *name, const struct cut_count *n)
+{
+    warn("%s: %zu objects, %zu without stars, %zu below the ellipticity, %zu above the size, "
+         "%zu above the signal to noise, %zu used", name, n->all, n->stars, n->ellipticity, n->size, n->snr, n->where);
+}
+
+/* Column CUT of all rows, or only the rows that are used. */
+static void keep_rows(struct table *t, const int64_t *bits, int mark)
+{
+    if (mark) {
+        if (!table_find(t, "CUT"))
+            check(table_add(t, "CUT", COL_INT, "", "cuts failed, see cutcat(1)"), "CUT");
+        int64_t *cut = table_ints(t, "CUT");
+        if (!cut)
+            die(EXIT_RUN, "column CUT is not of whole numbers");
+        memcpy(cut, bits, t->nrow * sizeof *cut);
+        return;
+    }
+    unsigned char *keep = malloc(t->nrow + 1);
+    if (!keep)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    for (size_t i = 0; i < t->nrow; i++)
+        keep[i] = bits[i] == 0;
+    check(table_keep(t, keep), "rows");
+    free(keep);
+}
+
+int main(int argc, char **argv)
+{
+    struct common c = COMMON_DEFAULTS;
+    struct params p = {0};
+    struct cuts cuts = CUTS_DEFAULTS;
+    const struct program prog = {
+        "cutcat", "keep the objects of a shape catalogue that are used, and count what each cut removes",
+        "[CATALOGUE]", 0, 1,
+        "cutcat image.shapes --stars stars.rrg -o image.use\n"
+        "cutcat image.shapes --size-floor 0 --where 'MAG_AUTO<26' --mark -o image.marked"};
+    const struct opt own[] = {
+        {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file with DSTAR (default: keywords of the catalogue)", NULL, 1},
+        {"dstar", 0, OPT_CHOICE, &p.which, 0, 0, "HOW", "size of a star: smallest width, its own width, each object's width", "min|own|each", 0},
+        {"star-prob", 0, OPT_REAL, &cuts.star_prob, 0, 1, "P", "an object with STAR_PROB above is a star (1: no cut)", NULL, 0},
+        {"max-ellipticity", 'e', OPT_REAL, &cuts.max_e, 0, 1e9, "E", "keep |e| < E", NULL, 0},
+        {"size-factor", 0, OPT_REAL, &cuts.factor, 0, 1e3, "F", "keep d >= F sqrt(d*^2 + FLOOR)", NULL, 0},
+        {"size-floor", 0, OPT_REAL, &cuts.floor, 0, 1e6, "PX2", "the floor in the size cut, pixel^2", NULL, 0},
+        {"snr", 0, OPT_REAL, &cuts.snr, 0, 1e9, "MIN", "keep FLUX_AUTO/FLUXERR_AUTO >= MIN (0: no cut)", NULL, 0},
+        {"flags", 0, OPT_LONG, &cuts.flags, 0, 511, "MASK", "FLAGS_RRG with one of these bits fails the size cut", NULL, 0},
+        {"where", 0, OPT_STRS, &p.where, 0, 0, "EXPR", "keep NAME<VALUE (< <= > >= = !=); may be given several times", NULL, 0},
+        {"mark", 0, OPT_FLAG, &p.mark, 0, 0, NULL, "keep all rows and add the column CUT", NULL, 0},
+        {0}};
+    opt_parse(&prog, own, &c, argc, argv);
+
+    struct err e;
+    struct table t = {0};
+    struct starmom stars;
+    struct cut_count n;
+    struct cut_where *where = parse_where(&p.where);
+    if (table_read(&t, c.argv[0], c.max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    find_dstar(&cuts, &stars, &p, &t, c.max_memory);
+    int64_t *bits = calloc(t.nrow + 1, sizeof *bits);
+    if (!bits)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    if (cuts_apply(&t, &cuts, p.where.n, where, bits, &n, &e))
+        die(EXIT_RUN, "%s: %s", c.argv[0], e.text);
+    if (c.verbose || c.check)
+        tell(c.argv[0], &n);
+    if (!c.check) {
+        set_keywords(&t, &cuts, &n);
+        keep_rows(&t, bits, p.mark);
+        char *record = opt_record(&prog, own, &c);
+        const char *inputs[] = {c.argv[0], p.stars};
+        if (table_write(&t, c.out, record, inputs, p.stars ? 2 : 1, &e))
+            die(EXIT_RUN, "%s", e.text);
+        free(record);
+    }
+    free(bits);
+    free(where);
+    table_free(&t);
+    return EXIT_DONE;
+}

@@ -1,0 +1,50 @@
+# cutcat: the paper's cuts, counts, marks; bad input.
+cat >in.cat <<'T'
+# Keyword: DSTAR = 0.6
+# Keyword: DSTAROWN = 0.9
+# Keyword: SHEAR1 = 0.05
+# NUMBER E1 E2 D_RRG D_PSF FLUX_AUTO FLUXERR_AUTO STAR_PROB FLAGS_RRG MAG_AUTO
+1 0.1 0.2 1.2 0.7 100 5 0.1 0 25.5
+2 0.1 0.2 1.2 0.7 100 5 0.95 0 20
+3 0.8 0.6 1.2 0.7 100 5 0.1 64 25
+4 nan nan 1.2 0.7 100 5 0.1 32 25
+5 0.1 0.2 1.046 0.7 100 5 0.1 0 25
+6 0.1 0.2 1.047 0.7 100 5 0.1 0 25
+7 0.1 0.2 nan 0.7 100 5 0.1 1 25
+8 0.1 0.2 1.2 0.7 49 5 0.1 0 26.5
+9 0.1 0.2 1.3 0.7 100 5 0.1 8 25
+T
+ok "default cuts" cutcat in.cat -o use.cat -v
+near "one line on stderr with the counts" "$(wc -l <cmd.err)" 1 0
+near "rows used" "$(col use.cat NUMBER | tr '\n' ' ' | tr -d ' ')" 16 0
+i=0
+for k in "NDET 9" "NSTARCUT 8" "NELLCUT 6" "NSIZECUT 3" "NSNRCUT 2" "NUSED 2" "DSTAR 0.6" "SHEAR1 0.05"; do
+    set -- $k; near "keyword $1" "$(key use.cat "$1")" "$2" 0
+done
+near "d_cut = 1.2 sqrt(.36 + .4)" "$(key use.cat DCUT)" "$(awk 'BEGIN { printf "%.17g", 1.2 * sqrt(.76) }')" 1e-15
+cutcat in.cat --mark -o mark.cat
+near "--mark keeps all rows" "$(col mark.cat NUMBER | wc -l)" 9 0
+near "column CUT" "$(col mark.cat CUT | tr '\n' ' ' | tr -d ' ')" "012640484" 0
+cutcat mark.cat --mark -o again.cat
+near "marking again gives the same" "$(paste <(col mark.cat CUT) <(col again.cat CUT) | awk '$1 != $2' | wc -l)" 0 0
+cutcat in.cat --size-floor 0 -o f0.cat; near "without the 0.4: object 5 is used too" "$(key f0.cat NUSED)" 3 0
+cutcat in.cat --dstar own -o own.cat; near "d* with own widths: limit 1.317" "$(key own.cat NUSED)" 0 0
+cutcat in.cat --dstar each -o each.cat; near "d* at each object's width: limit 1.132" "$(col each.cat NUMBER | tr -d '\n')" 1 0
+cutcat in.cat --where 'MAG_AUTO<25.2' --where 'NUMBER != 1' -o w.cat; near "--where twice" "$(col w.cat NUMBER | tr -d '\n')" 6 0
+cutcat in.cat --snr 0 --star-prob 1 --max-ellipticity 2 --flags 0 -o loose.cat; near "loose cuts leave those with a size and an ellipticity" "$(col loose.cat NUMBER | tr -d '\n')" 123689 0
+cutcat in.cat -s 5 >pipe.cat; cutcat - <in.cat >pipe2.cat; near "pipe: the same rows" "$(diff <(grep -v '^#' pipe.cat) <(grep -v '^#' pipe2.cat) | wc -l)" 0 0
+cutcat in.cat -j 2 -o j2.cat; same "threads" use.cat j2.cat
+ok "nothing survives" cutcat in.cat --snr 1e6 -o none.cat
+near "nothing survives: a header and no row" "$(grep -vc '^#' none.cat)" 0 0
+ok "an empty catalogue" cutcat none.cat --snr 0 -o none2.cat
+{ printf '# Keyword: DSTAR = 0.9\n# WIDTH\n1\n'; } >stars.rrg
+cutcat in.cat --stars stars.rrg -o s.cat; near "--stars wins over the catalogue" "$(key s.cat DSTAR)" 0.9 0
+fails "star file without DSTAR" 1 cutcat in.cat --stars stars.rrg --dstar own
+grep -v DSTAR in.cat >nod.cat; fails "no d* anywhere" 1 cutcat nod.cat
+fails "malformed comparison" 2 cutcat in.cat --where 'MAG_AUTO<x'
+fails "unknown column" 1 cutcat in.cat --where 'MAGAUTO<3'
+sed 's/D_RRG/D_OLD/' in.cat >bad.cat; fails "no shapes" 1 cutcat bad.cat
+fails "missing file" 1 cutcat nothere.cat
+head -n 6 in.cat >cut.cat; printf "3 0.1 0.2 1" >>cut.cat; fails "truncated row" 1 cutcat cut.cat
+fails "output is the input" 1 cutcat in.cat -o in.cat
+fails "output is the star file" 1 cutcat in.cat --stars stars.rrg -o stars.rrg
