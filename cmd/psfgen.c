@@ -111,7 +111,7 @@ static void check_options(const struct psfgen *g, const struct opt *own, const s
 {
     static const char *const tel[] = {"telescope", "diameter", "wavelength", "bandwidth", "wavelengths", "obscuration",
                                       "obscuration-offset", "struts", "strut-width", "strut-angle", "zernike", "pupil-grid"};
-    static const char *const file[] = {"from-scale", "cutoff", "has-pixel", "normalise", "force"};
+    static const char *const file[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "normalise", "force"};
     for (size_t i = 0; g->from && i < sizeof tel / sizeof *tel; i++)
         if (opt_given(own, c, tel[i]))
             die(EXIT_USAGE, "option --%s: a PSF from a file has no telescope: leave out this or --from", tel[i]);
@@ -262,9 +262,9 @@ int main(int argc, char **argv)
         {"scale", 'x', OPT_REAL, &g.scale, 1e-6, 1e3, "ARCSEC", "sampling of the image", NULL, 0},
         {"size", 'n', OPT_LONG, &g.size, 1, 16384, "N", "side of the image, samples", NULL, 0},
         {"from", 'f', OPT_STR, &g.from, 0, 0, "FILE", "a PSF image or PSF file instead of a telescope", NULL, 1},
-        {"from-scale", 0, OPT_REAL, &g.from_scale, 1e-6, 1e3, "ARCSEC", "its sampling, over its header's", NULL, 0},
-        {"cutoff", 0, OPT_REAL, &g.cutoff, 1e-6, 1e6, "U", "its highest frequency, cycles/arcsec", NULL, 0},
-        {"has-pixel", 0, OPT_FLAG, &g.has_pixel, 0, 0, NULL, "its pixel is in, whatever PIXRESP says", NULL, 0},
+        {"psf-scale", 0, OPT_REAL, &g.from_scale, 1e-6, 1e3, "ARCSEC", "its sampling, over its header's", NULL, 0},
+        {"psf-cutoff", 0, OPT_REAL, &g.cutoff, 1e-6, 1e6, "U", "its highest frequency, cycles/arcsec", NULL, 0},
+        {"psf-has-pixel", 0, OPT_FLAG, &g.has_pixel, 0, 0, NULL, "its pixel is in, whatever PIXRESP says", NULL, 0},
         {"normalise", 0, OPT_FLAG, &g.normalise, 0, 0, NULL, "divide it by its flux", NULL, 0},
         {"force", 0, OPT_FLAG, &g.force, 0, 0, NULL, "apply diffusion or pixel a second time", NULL, 0},
         {0}
@@ -286,5 +286,6 @@ int main(int argc, char **argv)
         free(record);
     }
     otf_free(&bare);
+    free(c.argv);
     return EXIT_DONE;
 }
