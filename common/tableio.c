@@ -7,8 +7,10 @@
  * which columns are whole numbers, numbers or words.
  */
 #include "tableio.h"
+#include "fileio.h"
 #include "imageio.h"
 #include "outfile.h"
+#include "source.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -21,8 +23,10 @@ enum { UNTYPED = -1 };
 
 /* ---- lines of a file ---- */
 
-struct source {
+struct lines {
     int fd;
+    struct source *gzip;     /* instead of fd when the file is compressed */
+    uint64_t offset;         /* bytes taken from it */
     const char *name;        /* for messages */
     char *buf;
     size_t begin, end, cap;  /* unread bytes are buf[begin..end) */
@@ -34,7 +38,26 @@ struct source {
     struct err *e;
 };
 
-static int source_fill(struct source *s)
+/* Up to n more bytes of the input; 0 at its end, -1 on failure. */
+static ssize_t more_bytes(struct lines *s, char *to, size_t n)
+{
+    if (!s->gzip) {
+        ssize_t got = file_read(s->fd, to, n);
+        if (got < 0)
+            err_set(s->e, E_IO, "%s: %s", s->name, strerror(errno));
+        return got;
+    }
+    uint64_t have = 0;
+    if (source_need(s->gzip, s->offset + n, &have, s->e))
+        return -1;
+    n = (size_t)(have - s->offset);
+    if (n && source_read(s->gzip, s->offset, to, n, s->e))
+        return -1;
+    s->offset = have;
+    return (ssize_t)n;
+}
+
+static int lines_fill(struct lines *s)
 {
     size_t from = s->begin < s->keep ? s->begin : s->keep;
     if (from) {
@@ -53,26 +76,23 @@ static int source_fill(struct source *s)
         s->buf = b;
         s->cap = cap;
     }
-    ssize_t n;
-    do
-        n = read(s->fd, s->buf + s->end, BLOCK);
-    while (n < 0 && errno == EINTR);
+    ssize_t n = more_bytes(s, s->buf + s->end, BLOCK);
     if (n < 0)
-        return err_set(s->e, E_IO, "%s: %s", s->name, strerror(errno));
+        return E_IO;
     s->eof = n == 0;
     s->end += (size_t)n;
     return OK;
 }
 
 /* The next line without its end; *line = NULL at the end of the file. */
-static int source_line(struct source *s, char **line, size_t *len)
+static int lines_next(struct lines *s, char **line, size_t *len)
 {
     size_t seen = 0;
     char *nl;
     while (!(nl = s->end - s->begin > seen ? memchr(s->buf + s->begin + seen, '\n', s->end - s->begin - seen) : NULL)
            && !s->eof && s->end - s->begin <= LINE_MAX_BYTES) {
         seen = s->end - s->begin;
-        int st = source_fill(s);
+        int st = lines_fill(s);
         if (st)
             return st;
     }
@@ -136,13 +156,13 @@ static void labels_free(struct labels *h)
     *h = (struct labels){0};
 }
 
-static int no_memory(struct source *s)
+static int no_memory(struct lines *s)
 {
     return err_set(s->e, E_NOMEM, "%s: line %ld: %s", s->name, s->line, err_text(E_NOMEM));
 }
 
 /* Replace *to by a copy of n bytes without blanks at both ends. */
-static int set_text(struct source *s, char **to, const char *from, size_t n)
+static int set_text(struct lines *s, char **to, const char *from, size_t n)
 {
     while (n && is_blank(*from))
         from++, n--;
@@ -177,7 +197,7 @@ static int type_from_tag(const char *s, size_t n)
 }
 
 /* The entry for column `number` among the described ones. */
-static int label_about(struct source *s, struct labels *h, int64_t number, struct label **out)
+static int label_about(struct lines *s, struct labels *h, int64_t number, struct label **out)
 {
     if (number < 1 || number > CELLS_MAX)
         return err_set(s->e, E_DATA, "%s: line %ld: column number %lld is not in 1..%d", s->name, s->line,
@@ -193,7 +213,7 @@ static int label_about(struct source *s, struct labels *h, int64_t number, struc
     return OK;
 }
 
-static int label_name(struct source *s, struct label *l, const char *name, size_t n, int64_t number)
+static int label_name(struct lines *s, struct label *l, const char *name, size_t n, int64_t number)
 {
     if (l->name && (strlen(l->name) != n || memcmp(l->name, name, n) != 0))
         return err_set(s->e, E_DATA, "%s: line %ld: column %lld is called %.*s here and %s above", s->name, s->line,
@@ -202,7 +222,7 @@ static int label_name(struct source *s, struct label *l, const char *name, size_
 }
 
 /* After "# Column ": "3: NAME [unit,type] description". */
-static int header_typed(struct source *s, struct labels *h, const char *p, const char *end)
+static int header_typed(struct lines *s, struct labels *h, const char *p, const char *end)
 {
     size_t n = next_word(&p, end);
     int64_t number;
@@ -238,7 +258,7 @@ static int header_typed(struct source *s, struct labels *h, const char *p, const
 }
 
 /* "3 NAME description [unit]" (Source Extractor's way; ours too). */
-static int header_numbered(struct source *s, struct labels *h, int64_t number, const char *p, const char *end)
+static int header_numbered(struct lines *s, struct labels *h, int64_t number, const char *p, const char *end)
 {
     struct label *l;
     int st = label_about(s, h, number, &l);
@@ -262,7 +282,7 @@ static int header_numbered(struct source *s, struct labels *h, int64_t number, c
 }
 
 /* Are all words of the line column names?  Then they replace the names known so far. */
-static int header_names(struct source *s, struct labels *h, const char *p, const char *end)
+static int header_names(struct lines *s, struct labels *h, const char *p, const char *end)
 {
     char name[256];
     size_t count = 0, n;
@@ -296,7 +316,7 @@ static int header_names(struct source *s, struct labels *h, const char *p, const
 }
 
 /* "NAME = VALUE" of a Keyword line. */
-static int header_keyword(struct source *s, struct table *t, const char *p, const char *end)
+static int header_keyword(struct lines *s, struct table *t, const char *p, const char *end)
 {
     size_t n = next_word(&p, end);
     const char *eq = p + n;
@@ -325,7 +345,7 @@ static int starts(const char *p, const char *end, const char *word)
 }
 
 /* One line that begins with '#'; p is behind the '#'. */
-static int header_line(struct source *s, struct labels *h, struct table *t, const char *p, const char *end)
+static int header_line(struct lines *s, struct labels *h, struct table *t, const char *p, const char *end)
 {
     int64_t number;
     size_t n = next_word(&p, end);
@@ -349,7 +369,7 @@ static int header_line(struct source *s, struct labels *h, struct table *t, cons
 }
 
 /* Without a line of names the numbered ones are taken; gaps belong to the column before. */
-static int labels_from_numbers(struct source *s, struct labels *h)
+static int labels_from_numbers(struct lines *s, struct labels *h)
 {
     if (!h->n_about)
         return err_set(s->e, E_DATA, "%s: no column names: the header needs a line '# NAME NAME ...' in capital letters", s->name);
@@ -379,7 +399,7 @@ static int labels_from_numbers(struct source *s, struct labels *h)
 }
 
 /* Move what is known by number to the named columns. */
-static int labels_join(struct source *s, struct labels *h)
+static int labels_join(struct lines *s, struct labels *h)
 {
     if (h->n == 0)
         return labels_from_numbers(s, h);
@@ -404,26 +424,26 @@ static int labels_join(struct source *s, struct labels *h)
 /* ---- rows ---- */
 
 struct rows {
-    struct source *s;
+    struct lines *s;
     struct table *t;
     double *ragged;          /* cells of one ragged row */
     size_t ragged_cap;
 };
 
-static int cell_error(struct source *s, const char *column, const char *p, size_t n, const char *what)
+static int cell_error(struct lines *s, const char *column, const char *p, size_t n, const char *what)
 {
     return err_set(s->e, E_DATA, "%s: line %ld: column %s: '%.*s' %s", s->name, s->line, column,
                    (int)(n < 60 ? n : 60), p, what);
 }
 
 /* The cell is not a number: say why. */
-static int number_error(struct source *s, const char *column, const char *p, size_t n, int st)
+static int number_error(struct lines *s, const char *column, const char *p, size_t n, int st)
 {
     return st == E_NOMEM ? no_memory(s)
          : cell_error(s, column, p, n, st == E_RANGE ? "is too large" : "is not a number");
 }
 
-static int count_error(struct source *s, const struct table *t, size_t got)
+static int count_error(struct lines *s, const struct table *t, size_t got)
 {
     return err_set(s->e, E_DATA, "%s: line %ld: %zu cells where the header names %zu columns", s->name, s->line, got, t->ncol);
 }
@@ -508,7 +528,7 @@ static int parse_row(struct rows *r, const char *p, const char *end)
 }
 
 /* A comment among the rows: only a second, different header is an error. */
-static int check_comment(struct source *s, const struct table *t, const char *p, const char *end)
+static int check_comment(struct lines *s, const struct table *t, const char *p, const char *end)
 {
     size_t n = next_word(&p, end), i = 0;
     int other = 0;
@@ -537,7 +557,7 @@ static int check_comment(struct source *s, const struct table *t, const char *p,
  */
 typedef int row_fn(void *ctx, const char *p, const char *end);
 
-static int each_row(struct source *s, const struct table *t, char *line, size_t len, row_fn *what, void *ctx)
+static int each_row(struct lines *s, const struct table *t, char *line, size_t len, row_fn *what, void *ctx)
 {
     int st = OK;
     while (line && !st) {
@@ -545,7 +565,7 @@ static int each_row(struct source *s, const struct table *t, char *line, size_t 
         if (next_word(&p, end))
             st = *p == '#' ? check_comment(s, t, p + 1, end) : what(ctx, p, end);
         if (!st)
-            st = source_line(s, &line, &len);
+            st = lines_next(s, &line, &len);
     }
     return st;
 }
@@ -558,7 +578,7 @@ static int each_parse(void *ctx, const char *p, const char *end)
 /* ---- types from the cells ---- */
 
 struct guess {
-    struct source *s;
+    struct lines *s;
     const struct labels *h;
     int ragged;              /* the last column is */
     struct { long word, number; int real; } *col;   /* first line with a word, with a number */
@@ -587,7 +607,7 @@ static int each_guess(void *ctx, const char *p, const char *end)
 }
 
 /* Find the types of untyped columns from all rows; s is left where it was. */
-static int guess_types(struct source *s, struct labels *h, const struct table *t, int ragged, char *line, size_t len)
+static int guess_types(struct lines *s, struct labels *h, const struct table *t, int ragged, char *line, size_t len)
 {
     struct guess g = {.s = s, .h = h, .ragged = ragged};
     g.col = calloc(h->n, sizeof *g.col);
@@ -615,7 +635,7 @@ static int guess_types(struct source *s, struct labels *h, const struct table *t
 
 /* ---- reading ---- */
 
-static int add_columns(struct source *s, const struct labels *h, struct table *t, int ragged)
+static int add_columns(struct lines *s, const struct labels *h, struct table *t, int ragged)
 {
     for (size_t i = 0; i < h->n; i++) {
         const struct label *l = &h->col[i];
@@ -630,10 +650,10 @@ static int add_columns(struct source *s, const struct labels *h, struct table *t
 }
 
 /* Header lines up to the first row, which is returned. */
-static int read_header(struct source *s, struct labels *h, struct table *t, char **line, size_t *len)
+static int read_header(struct lines *s, struct labels *h, struct table *t, char **line, size_t *len)
 {
     for (;;) {
-        int st = source_line(s, line, len);
+        int st = lines_next(s, line, len);
         if (st || !*line)
             return st;
         const char *p = *line, *end = *line + *len;
@@ -646,7 +666,7 @@ static int read_header(struct source *s, struct labels *h, struct table *t, char
     }
 }
 
-static int read_text(struct source *s, struct table *t)
+static int read_text(struct lines *s, struct table *t)
 {
     struct labels h = {0};
     char *line;
@@ -695,29 +715,56 @@ static int has_suffix_only(const char *name)
     return n > 2 && name[n - 1] == ']' && strchr(name, '[') && access(name, F_OK) != 0;
 }
 
+/* A compressed file: a FITS table, or text. */
+static int read_gzip(struct lines *s, struct table *t, const char *name)
+{
+    char first = '\0';
+    uint64_t have;
+    int st = source_open(&s->gzip, name, s->max_memory, s->e);
+    if (st)
+        return st;
+    s->end = 0;
+    st = source_need(s->gzip, 1, &have, s->e);
+    if (!st && have)
+        st = source_read(s->gzip, 0, &first, 1, s->e);
+    if (!st && first != 'S')
+        st = read_text(s, t);
+    source_close(s->gzip);
+    if (st || first != 'S')
+        return st;
+    if (strcmp(name, "-") == 0 && lseek(0, 0, SEEK_SET) != 0)
+        return err_set(s->e, E_IO, "standard input: %s", strerror(errno));
+    return read_fits(t, name, s->max_memory, s->e);
+}
+
+/* What the first bytes, which are in the buffer, announce. */
+static int read_any(struct lines *s, struct table *t, const char *name)
+{
+    int gzip = s->end >= 2 && s->buf[0] == '\x1f' && s->buf[1] == '\x8b', fits = s->end >= 1 && s->buf[0] == 'S';
+    if (!gzip && !fits)
+        return read_text(s, t);
+    if (strcmp(name, "-") == 0 && lseek(0, 0, SEEK_SET) != 0)
+        return err_set(s->e, E_DATA, "standard input: a catalogue as FITS or gzip cannot come through a pipe: give its file name");
+    return gzip ? read_gzip(s, t, name) : read_fits(t, name, s->max_memory, s->e);
+}
+
 int table_read(struct table *t, const char *name, double max_memory, struct err *e)
 {
     struct table got = {0};
-    int in = strcmp(name, "-") == 0, fits = 0;
-    struct source s = {.fd = 0, .name = in ? "standard input" : name, .keep = SIZE_MAX, .max_memory = max_memory, .e = e};
+    int in = strcmp(name, "-") == 0;
+    struct lines s = {.fd = 0, .name = in ? "standard input" : name, .keep = SIZE_MAX, .max_memory = max_memory, .e = e};
     if (name[0] == '\0')
         return err_set(e, E_MISSING, "an empty file name");
     if (!in && has_suffix_only(name))
         return read_fits(t, name, max_memory, e);
-    if (!in && (s.fd = open(name, O_RDONLY | O_CLOEXEC)) < 0)
+    if (!in && (s.fd = file_open(name, O_RDONLY, 0)) < 0)
         return err_set(e, E_IO, "%s: %s", name, strerror(errno));
-    int st = source_fill(&s);
+    int st = lines_fill(&s);
     if (!st)
-        fits = s.end >= 2 && (s.buf[0] == 'S' || (s.buf[0] == '\x1f' && s.buf[1] == '\x8b'));
-    if (!st && !fits)
-        st = read_text(&s, &got);
-    if (s.fd > 0)
+        st = read_any(&s, &got, name);
+    if (!in)
         close(s.fd);
     free(s.buf);
-    if (!st && fits && in && lseek(0, 0, SEEK_SET) != 0)
-        st = err_set(e, E_DATA, "standard input: a FITS table cannot be read from a pipe: give its file name");
-    else if (!st && fits)
-        st = read_fits(&got, name, max_memory, e);
     if (st)
         table_free(&got);
     else

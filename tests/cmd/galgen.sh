@@ -115,6 +115,20 @@ ok "a FITS library" galgen --library m100.fits -n 30 -o f1.txt
 ok "the text library" galgen --library m100.txt -n 30 -o f2.txt
 same "FITS and text libraries give the same galaxies" <(grep -v '^#' f1.txt) <(grep -v '^#' f2.txt)
 
+
+# ---- compressed ----
+gzip -k m100.txt m100.fits
+for f in m100.txt.gz m100.fits.gz; do
+    ok "a library $f" galgen --library $f -n 30 -o f3.txt
+    same "$f gives the same galaxies" <(grep -v '^#' f3.txt) <(grep -v '^#' f2.txt)
+    ok "$f from standard input" bash -c "galgen --library - -n 30 < $f > f3.txt"
+    same "$f from standard input gives the same galaxies" <(grep -v '^#' f3.txt) <(grep -v '^#' f2.txt)
+done
+head -c 3000 m100.txt.gz > cut.gz
+fails "gzip cut off" 1 galgen --library cut.gz -n 3
+fails "gzip through a pipe" 1 bash -c 'cat m100.txt.gz | galgen --library - -n 3'
+fails "FITS through a pipe" 1 bash -c 'cat m100.fits | galgen --library - -n 3'
+
 # ---- faults ----
 fails "no place for coefficients" 2 galgen
 fails "range turned round" 2 galgen --mag-range 25,20 --models x
