@@ -139,7 +139,7 @@ static int read_cards(const struct walk *w, uint64_t at, struct fits_unit *u)
         for (int i = 0; i < FITS_BLOCK; i++)
             if (block[i] < ' ' || block[i] > '~')
                 return broken(w, "header card %zu has a byte 0x%02X, which is not text",
-                              u->cards.n + 1, (unsigned char)block[i]);
+                              u->cards.n + 1 + (size_t)i / CARD, (unsigned char)block[i]);
         for (const char *c = block; c < block + FITS_BLOCK; c += CARD) {
             char card[CARD + 1];
             memcpy(card, c, CARD);
