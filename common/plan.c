@@ -23,29 +23,34 @@ struct pose {
     double turn, g1, g2, g;
 };
 
-/* Field shear times own shear = shear g times a rotation (polar decomposition). */
+int shear_then(const double first[2], const double then[2], double g[2], double *turn)
+{
+    double p[4], q[4];
+    if (shear_matrix(first[0], first[1], p) || shear_matrix(then[0], then[1], q))
+        return E_RANGE;
+    const double a11 = q[0] * p[0] + q[1] * p[2], a12 = q[0] * p[1] + q[1] * p[3];
+    const double a21 = q[2] * p[0] + q[3] * p[2], a22 = q[2] * p[1] + q[3] * p[3];
+    /* polar decomposition: A = S R, S symmetric */
+    const double t = atan2(a21 - a12, a11 + a22), c = cos(t), d = sin(t);
+    const double s11 = a11 * c - a12 * d, s12 = a11 * d + a12 * c, s22 = a21 * d + a22 * c;
+    *turn = t;
+    g[0] = (s11 - s22) / (s11 + s22);
+    g[1] = 2 * s12 / (s11 + s22);
+    return hypot(g[0], g[1]) < 1 ? OK : E_RANGE;
+}
+
+/* Own shear, then the field's; with a series, the own shear alone. */
 static int pose_of(const struct view *v, const struct emitter *s, struct pose *q)
 {
-    double own[4], field[4], a[4];
-    *q = (struct pose){.turn = s->rotation, .g1 = v->g1, .g2 = v->g2};
-    int series = v->shear_order > 0;
-    if (series)
-        *q = (struct pose){.turn = s->rotation, .g1 = s->g1, .g2 = s->g2};
-    else if (s->g1 != 0 || s->g2 != 0) {
-        if (shear_matrix(s->g1, s->g2, own) || shear_matrix(v->g1, v->g2, field))
-            return E_RANGE;
-        a[0] = field[0] * own[0] + field[1] * own[2];
-        a[1] = field[0] * own[1] + field[1] * own[3];
-        a[2] = field[2] * own[0] + field[3] * own[2];
-        a[3] = field[2] * own[1] + field[3] * own[3];
-        double turn = atan2(a[2] - a[1], a[0] + a[3]), c = cos(turn), d = sin(turn);
-        double s11 = a[0] * c - a[1] * d, s12 = a[0] * d + a[1] * c, s22 = a[2] * d + a[3] * c;
-        q->turn += turn;
-        q->g1 = (s11 - s22) / (s11 + s22);
-        q->g2 = 2 * s12 / (s11 + s22);
+    const double own[2] = {s->g1, s->g2}, field[2] = {v->g1, v->g2};
+    double g[2] = {v->shear_order ? s->g1 : v->g1, v->shear_order ? s->g2 : v->g2}, turn = 0;
+    if (!v->shear_order && (s->g1 != 0 || s->g2 != 0)) {
+        int st = shear_then(own, field, g, &turn);
+        if (st)
+            return st;
     }
-    q->g = hypot(q->g1, q->g2);
-    return q->g < 1 && hypot(v->g1, v->g2) < 1 ? OK : E_RANGE;
+    *q = (struct pose){s->rotation + turn, g[0], g[1], hypot(g[0], g[1])};
+    return q->g < 1 ? OK : E_RANGE;
 }
 
 /* Everything the decision about one object needs, reused for all. */
@@ -53,7 +58,9 @@ struct maker {
     struct plan *p;
     struct envelope env;
     double shells[SHAPELET_NMAX + 1];
-    double turn_table;     /* 1 when some object is turned */
+    double group_tol;      /* electrons, for the parts of one object */
+    double group_norm;     /* sum of sqrt |flux| of its parts */
+    int group_left;        /* parts still to come */
     int used[SIDES];       /* grid number of a side class + 1 */
 };
 
@@ -71,11 +78,18 @@ struct light {
     double tol;            /* allowed error of a pixel over |flux| */
 };
 
+/* Peak pixel of a star, fraction of its flux: between those on a centre and on a corner, as a Gaussian. */
+static double star_peak(const struct wings *w, double x, double y)
+{
+    const double dx = x - floor(x + 0.5), dy = y - floor(y + 0.5), centre = w->w[0][0];
+    return centre * pow(w->peak / centre, 2 * (dx * dx + dy * dy));
+}
+
 static int light_of(struct maker *m, const struct emitter *s, const struct pose *q, struct light *l)
 {
     const struct plan *p = m->p;
     const double theta2 = p->view.pixel * p->view.pixel;
-    double star = p->view.psf ? p->wings.peak : 1;
+    double star = p->view.psf ? star_peak(&p->wings, s->x, s->y) : 1;
     *l = (struct light){.beta = s->beta * s->dilation, .stretch = stretch_of(q->g), .peak = star};
     if (p->view.shear_order)
         l->stretch *= stretch_of(hypot(p->view.g1, p->view.g2));
@@ -85,9 +99,12 @@ static int light_of(struct maker *m, const struct emitter *s, const struct pose 
             m->shells[n] /= s->dilation;
             l->power += m->shells[n] * m->shells[n];
         }
-        l->peak = l->power > 0 ? 1 / (1 / (theta2 * l->power) + 1 / star) : 0;
+        /* sum c^2 is the mean brightness weighted by light: half the peak of a Gaussian, less of cuspier ones */
+        l->peak = l->power > 0 ? 1 / (1 / (1.6 * theta2 * l->power) + 1 / star) : 0;
     }
     l->tol = fmax(p->acc.eps * l->peak, p->acc.floor / fabs(s->flux));
+    if (m->group_left > 0)
+        l->tol = m->group_tol / (m->group_norm * sqrt(fabs(s->flux)));
     return l->tol > 0 && l->beta >= 0 && isfinite(l->beta) && isfinite(l->power) ? OK : E_DATA;
 }
 
@@ -214,13 +231,13 @@ static int plan_fourier(struct maker *m, const struct emitter *s, const struct l
     double own = 0, size = 0;
     if (s->coef) {
         double core = w->core / (l->beta * l->stretch);
-        size = l->power > 0 ? 1 / sqrt(2 * M_PI * l->power) : 0;
+        size = 0.9 / sqrt(4 * M_PI * l->power);   /* rms of a Gaussian of that power, and a margin */
         own = own_reach(m, s, l) * sqrt(1 + core * core);
     }
     int side = 0, good;
     for (;; side++) {
         double half = (side_of[side] / 2 - 1) * p->view.pixel;
-        good = half >= own && wings_folded(w, half - size, half, side_of[side]) <= p->acc.wing * l->tol;
+        good = half >= own && wings_folded(w, size, half, side_of[side]) <= p->acc.wing * l->tol;
         if (good || side == SIDES - 1 || side_of[side + 1] > p->acc.side_max)
             break;
     }
@@ -284,6 +301,26 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     double k = fmin(d->kcut, g->kmax), plane = 0.8 * k * k;
     double rows = d->mapped ? plane * (20e-9 + 2e-9 * orders) : plane * (0.25e-9 * orders + 1.5e-9);
     return 1.5e-6 + matrix + rows + 1e-9 * orders * orders * k / 8 + area * (0.8e-9 + 0.25e-9 * log2(d->nx));
+}
+
+/* Tolerance of an object of several parts: from the sum of their peaks, divided as the square root of flux. */
+static void start_group(struct maker *m, size_t i)
+{
+    const struct plan *p = m->p;
+    const struct emitter *s = &p->emitter[i];
+    double peak = 0;
+    m->group_norm = 0;
+    for (int k = 0; k < s->parts && i + (size_t)k < p->n; k++) {
+        struct pose q;
+        struct light l;
+        if (!isfinite(s[k].flux) || pose_of(&p->view, &s[k], &q))
+            continue;
+        if (light_of(m, &s[k], &q, &l) == OK)
+            peak += l.peak * fabs(s[k].flux);
+        m->group_norm += sqrt(fabs(s[k].flux));
+    }
+    m->group_tol = fmax(p->acc.eps * peak, p->acc.floor);
+    m->group_left = s->parts;
 }
 
 static int plan_one(struct maker *m, size_t i)
@@ -381,7 +418,10 @@ static int make(struct maker *m)
         p->fft_plans++;
     }
     for (size_t i = 0; i < p->n && st == OK; i++) {
+        if (p->emitter[i].parts > 1)
+            start_group(m, i);
         st = plan_one(m, i);
+        m->group_left -= m->group_left > 0;
         if (st == E_DATA) {
             p->n_bad++;
             p->draw[i].path = PATH_NONE;

@@ -26,7 +26,11 @@ struct emitter {
     double rotation;       /* rad, anticlockwise */
     double dilation;       /* > 0 */
     double g1, g2;         /* own reduced shear */
+    int parts;             /* this and the next parts-1 are one object and share its tolerance; 0, 1: alone */
 };
+
+/* Shear `first`, then `then` = rotation by *turn (rad), then shear g. E_RANGE for |g| >= 1. */
+MUST_CHECK int shear_then(const double first[2], const double then[2], double g[2], double *turn);
 
 /* The image to be made. */
 struct view {

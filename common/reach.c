@@ -90,27 +90,79 @@ double envelope_value(const struct envelope *e, int nmax, const double *p, doubl
 
 /* ---- PSF ---- */
 
-/* Largest |pixel| by radius, and flux beyond, from an n x n image of a star at (n/2, n/2). */
-static void profile(struct wings *w, int n, const double *image, double scale)
+/*
+ * Largest |pixel| by radius from an n x n image of a star at (n/2, n/2) with pixels of
+ * `every` dr; out (or NULL): flux beyond.
+ */
+static void profile(const struct wings *m, int n, int every, const double *image, double *w, double *out)
 {
+    const double scale = m->pixel * m->pixel / (m->dr * m->dr * every * every);
     double rest = 0;
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
             double value = image[(size_t)j * (size_t)n + (size_t)i];
-            int k = (int)(hypot(i - n / 2, j - n / 2) + 0.5);
-            if (k >= w->n) {
+            int k = (int)((hypot(i - n / 2, j - n / 2) + 0.5) * every);
+            if (k >= m->n) {
                 rest += value;
                 continue;
             }
-            w->w[k] = fmax(w->w[k], fabs(value) * scale);
-            w->out[k] += value;
+            w[k] = fmax(w[k], fabs(value) * scale);
+            if (out)
+                out[k] += value;
         }
-    for (int k = w->n - 1; k >= 0; k--) {
-        rest += w->out[k];
-        w->out[k] = fabs(rest);
-        if (k < w->n - 1)
-            w->w[k] = fmax(w->w[k], w->w[k + 1]);
+    for (int k = m->n - 1; k >= 0; k--) {
+        if (k < m->n - 1)
+            w[k] = fmax(w[k], w[k + 1]);
+        if (!out)
+            continue;
+        rest += out[k];
+        out[k] = fabs(rest);
     }
+}
+
+/* Multiply the table by the transform of a Gaussian of variance `var` arcsec^2. */
+static int smooth(struct stamp_grid *g, double var)
+{
+    double *f = malloc(((size_t)g->kmax + 1) * sizeof *f);
+    if (!f)
+        return E_NOMEM;
+    for (int i = 0; i <= g->kmax; i++)
+        f[i] = exp(-2 * M_PI * M_PI * var * (i * g->du) * (i * g->du));
+    for (int row = 0; row <= 2 * g->kmax; row++)
+        for (int i = 0; i <= g->kmax; i++) {
+            const size_t at = (size_t)row * (size_t)g->ld + (size_t)i;
+            const double factor = f[abs(row - g->kmax)] * f[i];
+            g->t_re[at] *= factor;
+            if (g->t_im)
+                g->t_im[at] *= factor;
+        }
+    free(f);
+    return OK;
+}
+
+/* Profiles of broad objects: the same frequencies on coarser pixels. */
+static int broad_levels(struct wings *m, struct stamp_grid *g, struct stamp_work *work, double *image)
+{
+    static const double sigma[WINGS_LEVELS] = {0, 0.1, 0.2, 0.4};
+    static const int every[WINGS_LEVELS] = {1, 2, 4, 4};
+    const struct shape star = {0};
+    for (int l = 1; l < WINGS_LEVELS; l++) {
+        struct stamp_grid coarse = *g;
+        coarse.n = g->n / every[l];
+        coarse.pixel = g->pixel * every[l];
+        int st = smooth(g, sigma[l] * sigma[l] - sigma[l - 1] * sigma[l - 1]);
+        if (st == OK)
+            st = fft_plan_c2r(&coarse.fft, coarse.n, coarse.n);
+        if (st)
+            return st;
+        st = stamp_fourier(&coarse, work, &star, coarse.n / 2, coarse.n / 2, 1, 1.1 / (sigma[l] * g->du), image);
+        fft_done(coarse.fft);
+        if (st)
+            return st;
+        m->sigma[l] = sigma[l];
+        profile(m, coarse.n, every[l], image, m->w[l], NULL);
+    }
+    return OK;
 }
 
 /* tail[i] from the table of T; every |u| <= (i+1) du counts as i. */
@@ -128,6 +180,16 @@ static void band_tail(struct wings *w, const struct stamp_grid *g)
         w->tail[k] += w->tail[k + 1];
 }
 
+/* Peak of a star on the corner of four pixels: its value half a pixel away in x and y. */
+static double star_peak(const struct wings *m, int n, int fine, const double *image)
+{
+    const double scale = fine * fine;
+    if (fine == 1)                     /* well sampled: the geometric mean of its neighbours is below it */
+        return scale * sqrt(fabs(m->w[0][0] / scale * image[(size_t)(n / 2 + 1) * (size_t)n + (size_t)(n / 2 + 1)]));
+    const int d = fine / 2 + fine % 2;
+    return scale * fmax(image[(size_t)(n / 2 + d) * (size_t)n + (size_t)(n / 2 + d)], 1e-6 * m->w[0][0]);
+}
+
 int wings_new(struct wings *w, const struct otf *t, const struct stamp_response *r, double pixel)
 {
     if (!(pixel > 0))
@@ -135,33 +197,35 @@ int wings_new(struct wings *w, const struct otf *t, const struct stamp_response 
     const int fine = pixel * t->ucut > 0.6 ? (int)ceil(pixel * t->ucut / 0.6) : 1;
     const double step = pixel / fine;
     double side = 26 / step;
-    const int n = side < 64 ? 64 : side > 1024 ? 1024 : fft_good_size((int)side);
+    const int n = 4 * (side < 64 ? 16 : side > 1024 ? 256 : fft_good_size((int)(side / 4)));
     struct stamp_grid g = {0};
     struct stamp_work *work = NULL;
     int st = stamp_grid_new(&g, t, r, step, n);
     if (st)
         return st;
     struct wings m = {.pixel = pixel, .n = n / 2, .dr = step, .nu = (int)(1.5 * g.kmax) + 2, .du = g.du};
-    m.w = calloc((size_t)m.n, sizeof *m.w);
-    m.out = calloc((size_t)m.n, sizeof *m.out);
-    m.tail = calloc((size_t)m.nu, sizeof *m.tail);
+    double *space = calloc((WINGS_LEVELS + 1) * (size_t)m.n + (size_t)m.nu, sizeof *space);
+    for (int l = 0; space && l < WINGS_LEVELS; l++)
+        m.w[l] = space + (size_t)l * (size_t)m.n;
     double *image = fft_alloc((size_t)n * (size_t)n * sizeof *image);
-    st = m.w && m.out && m.tail && image ? stamp_work_new(&work) : E_NOMEM;
+    st = space && image ? stamp_work_new(&work) : E_NOMEM;
     const struct shape star = {0};
     if (st == OK)
         st = stamp_fourier(&g, work, &star, n / 2, n / 2, 1, 2.0 * g.kmax + 1, image);
     if (st == OK) {
-        profile(&m, n, image, (double)fine * fine);
+        m.out = space + WINGS_LEVELS * (size_t)m.n;
+        m.tail = m.out + m.n;
+        profile(&m, n, 1, image, m.w[0], m.out);
         band_tail(&m, &g);
-        st = stamp_fourier(&g, work, &star, n / 2 + 0.5 * fine, n / 2 + 0.5 * fine, 1, 2.0 * g.kmax + 1, image);
-        m.peak = fine * fine * fmax(image[(size_t)(n / 2) * (size_t)n + (size_t)(n / 2)], 1e-6 * m.w[0]);
-        m.core = pixel / sqrt(2 * M_PI * fmin(m.w[0], 1));
+        m.core = pixel / sqrt(2 * M_PI * fmin(m.w[0][0], 1));
+        m.peak = star_peak(&m, n, fine, image);
+        st = broad_levels(&m, &g, work, image);
     }
     stamp_work_free(work);
     fft_free(image);
     stamp_grid_free(&g);
     if (st)
-        wings_free(&m);
+        free(space);
     else
         *w = m;
     return st;
@@ -169,21 +233,23 @@ int wings_new(struct wings *w, const struct otf *t, const struct stamp_response 
 
 void wings_free(struct wings *w)
 {
-    free(w->w);
-    free(w->out);
-    free(w->tail);
+    free(w->w[0]);
     *w = (struct wings){0};
 }
 
-double wings_folded(const struct wings *w, double near, double half, int n)
+double wings_folded(const struct wings *w, double sigma, double half, int n)
 {
     /* nearer the border of the table its own replicas count: continue by the laws r^-3 and r^-1 */
     const int last = w->n - w->n / 8;
+    int l = WINGS_LEVELS - 1;
+    while (w->sigma[l] > sigma)
+        l--;
+    const double near = half - (sigma - w->sigma[l]);
     const int i = near <= 0 ? 0 : near < last * w->dr ? (int)(near / w->dr) : last;
     const int k = half <= 0 ? 0 : half < last * w->dr ? (int)(half / w->dr) : last;
     const double far = near > last * w->dr ? near / (last * w->dr) : 1;
     const double out = half > last * w->dr ? half / (last * w->dr) : 1;
-    return w->w[i] / (far * far * far) + w->out[k] / out / ((double)n * n);
+    return w->w[l][i] / (far * far * far) + w->out[k] / out / ((double)n * n);
 }
 
 double wings_tail(const struct wings *w, double u)

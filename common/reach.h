@@ -36,17 +36,24 @@ double envelope_value(const struct envelope *e, int nmax, const double *p, doubl
 
 /* ---- PSF ---- */
 
+#define WINGS_LEVELS 4
+
+/*
+ * Level l is the profile of an object that is a Gaussian of rms sigma[l]: 0 for a star; broad objects
+ * smooth spikes and rings.
+ */
 struct wings {
     double pixel;          /* arcsec of the pixel the profile is for */
     int n;
     double dr;             /* arcsec */
-    double *w;             /* w[i]: largest |fraction of flux in a pixel| at i dr or beyond */
+    double sigma[WINGS_LEVELS];    /* arcsec, rising from 0 */
+    double *w[WINGS_LEVELS];       /* w[l][i]: largest |fraction of flux in a pixel| at i dr or beyond */
     double *out;           /* out[i]: |fraction of the flux beyond| i dr */
     int nu;
     double du;             /* cycles/arcsec */
     double *tail;          /* pixel^2 times the integral of |T| over |u| >= i du */
     double peak;           /* smallest peak pixel of a star at any phase, fraction of its flux */
-    double core;           /* Gaussian-equivalent sigma of the core, arcsec, sqrt(pixel^2 / (2 pi peak)) */
+    double core;           /* Gaussian-equivalent sigma of the core, arcsec, pixel / sqrt(2 pi peak) */
 };
 
 /* Measure on an image of a star, about 26 arcsec wide. */
@@ -54,11 +61,11 @@ MUST_CHECK int wings_new(struct wings *w, const struct otf *t, const struct stam
 void wings_free(struct wings *w);
 
 /*
- * Error at the border of a periodic stamp of n x n pixels, `half` arcsec from centre to border,
- * fraction of the flux: the nearest replica's wing (at `near` <= half for an extended object)
- * and the mean of all replicas, the flux outside spread over the stamp.
+ * Error at the border of a periodic stamp of n x n pixels, `half` arcsec from centre to border, fraction of
+ * the flux, for an object of rms size sigma (arcsec, along one axis): the nearest replica's
+ * wing and the mean of all replicas, the flux outside spread over the stamp.
  */
-double wings_folded(const struct wings *w, double near, double half, int n);
+double wings_folded(const struct wings *w, double sigma, double half, int n);
 
 /* pixel^2 times the integral of |T| beyond u. */
 double wings_tail(const struct wings *w, double u);

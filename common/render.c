@@ -8,6 +8,7 @@
 
 #define BATCH_PIXELS 262144    /* doubles held by one batch of stamps: 2 MiB */
 #define CHUNK 4                /* objects a thread takes at a time */
+#define TALL 320               /* rows; taller stamps, always few, are added to the image itself */
 
 int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
 {
@@ -35,7 +36,7 @@ int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *sc
     return E_RANGE;
 }
 
-/* Objects to draw in order of their first row in the image, then of their number. */
+/* Objects to draw: tall stamps first, then in order of their first row in the image, then of their number. */
 struct entry {
     int row;
     unsigned int index;
@@ -76,7 +77,7 @@ static int draw_some(void *ctx, long begin, long end, int worker)
     return OK;
 }
 
-/* Rows of doubles that slide up the image: row y lives at y % height. */
+/* Rows of doubles that slide up the image: row y lives at y % height; the image starts as zeros. */
 struct window {
     struct image *im;
     double *row;
@@ -84,7 +85,7 @@ struct window {
     long next;                     /* first row not yet written to the image */
 };
 
-/* Write rows below `end` to the image and clear them. */
+/* Add rows below `end` to the image and clear them. */
 static void window_move(struct window *w, long end)
 {
     const size_t nx = (size_t)w->im->nx;
@@ -92,8 +93,21 @@ static void window_move(struct window *w, long end)
         double *from = w->row + (size_t)(w->next % w->height) * nx;
         float *to = w->im->pix + (size_t)w->next * nx;
         for (size_t i = 0; i < nx; i++)
-            to[i] = (float)from[i];
+            to[i] = (float)(to[i] + from[i]);
         memset(from, 0, nx * sizeof *from);
+    }
+}
+
+/* A tall stamp, before the window moves. */
+static void image_add(struct image *im, const struct draw *d, const double *stamp)
+{
+    const long x0 = d->x0 < 0 ? 0 : d->x0, x1 = d->x0 + (long)d->nx > im->nx ? im->nx : d->x0 + (long)d->nx;
+    const long y0 = d->y0 < 0 ? 0 : d->y0, y1 = d->y0 + (long)d->ny > im->ny ? im->ny : d->y0 + (long)d->ny;
+    for (long y = y0; y < y1; y++) {
+        float *to = im->pix + (size_t)y * (size_t)im->nx;
+        const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx;
+        for (long x = x0; x < x1; x++)
+            to[x] = (float)(to[x] + from[x - d->x0]);
     }
 }
 
@@ -136,8 +150,13 @@ static int run(const struct plan *p, size_t n, const struct entry *e, struct win
         int st = par_for((long)m, CHUNK, threads, draw_some, job);
         if (st)
             return st;
-        for (size_t i = 0; i < m; i++)
-            window_add(w, &p->draw[e[begin + i].index], job->stamp[i]);
+        for (size_t i = 0; i < m; i++) {
+            const struct draw *d = &p->draw[e[begin + i].index];
+            if (e[begin + i].row < 0)
+                image_add(w->im, d, job->stamp[i]);
+            else
+                window_add(w, d, job->stamp[i]);
+        }
         begin += m;
     }
     window_move(w, w->im->ny);
@@ -156,7 +175,7 @@ static int workers_new(struct worker *w, int threads, size_t scratch)
     return st;
 }
 
-/* Entries in drawing order, tallest stamp and largest area. */
+/* Entries in drawing order, rows of the window and largest area. */
 static size_t order(const struct plan *p, struct entry *e, int *tallest, size_t *largest)
 {
     size_t n = 0;
@@ -164,8 +183,9 @@ static size_t order(const struct plan *p, struct entry *e, int *tallest, size_t 
         const struct draw *d = &p->draw[i];
         if (d->path == PATH_NONE)
             continue;
-        e[n++] = (struct entry){d->y0 < 0 ? 0 : d->y0, (unsigned int)i};
-        *tallest = d->ny > *tallest ? d->ny : *tallest;
+        int tall = d->ny > TALL;
+        e[n++] = (struct entry){tall ? -1 : d->y0 < 0 ? 0 : d->y0, (unsigned int)i};
+        *tallest = !tall && d->ny > *tallest ? d->ny : *tallest;
         if ((size_t)d->nx * (size_t)d->ny > *largest)
             *largest = (size_t)d->nx * (size_t)d->ny;
     }

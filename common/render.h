@@ -13,7 +13,7 @@
 #include "plan.h"
 #include "progress.h"
 
-/* Write every pixel of im (of the view's size). bar may be NULL. */
+/* Add to im (of the view's size, as image_new made it). bar may be NULL. */
 MUST_CHECK int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar);
 
 /* Object i alone, in double: stamp of draw[i].nx x draw[i].ny (fft_alloc'ed by the caller). */

@@ -1,0 +1,336 @@
+/*
+ * simage - scene list, shapelet models and PSF to an image of expected electrons.
+ *
+ * Noise-free: addnoise draws.  The positions of the list are not sheared; the
+ * shapes are, about each object's origin.
+ */
+#include "emit.h"
+#include "err.h"
+#include "image.h"
+#include "imageio.h"
+#include "models.h"
+#include "opt.h"
+#include "plan.h"
+#include "progress.h"
+#include "psf.h"
+#include "psfio.h"
+#include "render.h"
+#include "scene.h"
+#include "sky.h"
+#include "table.h"
+#include "tableio.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What the user asks for. */
+struct request {
+    const char *models, *psf, *set;
+    double pixel;            /* arcsec, of the detector */
+    double size[2];          /* output pixels; 0: from the list's FIELD */
+    double shear[2];
+    int order;               /* 0: exact */
+    long subpixel;
+    double exptime, zeropoint;
+    double diffusion;
+    double centre[2];        /* deg */
+    int no_pixel;
+    struct psf_options psf_options;
+    struct accuracy accuracy;
+};
+
+/* Everything read. */
+struct input {
+    struct table list, catalogue;
+    struct models models;
+    struct scene scene;
+    struct otf otf;
+    struct psf_info psf;
+    double fwhm;             /* of PSF and diffusion, arcsec; NaN without a PSF */
+};
+
+static void check(int st)
+{
+    if (st)
+        die(EXIT_RUN, "%s", err_text(st));
+}
+
+static void check_options(const struct request *r, const struct opt *own, const struct common *c)
+{
+    if (!opt_given(own, c, "pixscale"))
+        die(EXIT_USAGE, "how large are the pixels? Give -x ARCSEC");
+    if (!(hypot(r->shear[0], r->shear[1]) < 1))
+        die(EXIT_USAGE, "--shear %g,%g: a reduced shear is below 1", r->shear[0], r->shear[1]);
+    if (r->diffusion > 0 && !r->psf)
+        die(EXIT_USAGE, "--diffusion needs a PSF: give -p FILE");
+    if (opt_given(own, c, "size") && (r->size[0] != floor(r->size[0]) || r->size[1] != floor(r->size[1])))
+        die(EXIT_USAGE, "--size %g,%g: whole numbers of pixels, please", r->size[0], r->size[1]);
+}
+
+/* ---- input ---- */
+
+static void read_scene(struct input *in, const struct request *r, const struct common *c)
+{
+    struct err e;
+    const char *name = c->argv[0];
+    if (table_read(&in->list, name, c->max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (r->models) {
+        if (table_read(&in->catalogue, r->models, c->max_memory, &e)
+            || models_open(&in->models, &in->catalogue, r->models, &e))
+            die(EXIT_RUN, "%s", e.text);
+    }
+    if (scene_open(&in->scene, &in->list, r->models ? &in->models : NULL, r->zeropoint, name, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
+/* The PSF; its response, ready for a view. */
+static void read_psf(struct input *in, const struct request *r, const struct common *c, struct view *v)
+{
+    struct err e;
+    in->fwhm = NAN;
+    if (!r->psf)
+        return;
+    struct psf_options o = r->psf_options;
+    o.max_memory = c->max_memory;
+    if (psf_read(r->psf, &o, &in->otf, &in->psf, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (r->diffusion > 0 && in->otf.chdiff > 0)
+        die(EXIT_RUN, "%s: charge diffusion of %g\" is in the PSF already (CHDIFF): leave --diffusion out or make the PSF "
+            "with psfgen --diffusion 0", r->psf, in->otf.chdiff);
+    if (in->otf.pixel > 0 && !r->no_pixel && fabs(in->otf.pixel / v->pixel - 1) > 1e-6)
+        die(EXIT_RUN, "%s: a pixel of %g\" is in the PSF already (PIXRESP): it does not fit pixels of %g\"; make one "
+            "with psfgen without --pixel", r->psf, in->otf.pixel, v->pixel);
+    v->psf = &in->otf;
+    v->diffusion = r->diffusion;
+    v->no_pixel = r->no_pixel || in->otf.pixel > 0;
+    if (r->diffusion == 0 && isfinite(in->psf.fwhm))
+        in->fwhm = in->psf.fwhm;
+    else if (in->otf.n > 0 && psf_fwhm(&in->otf, r->diffusion, 0, &in->fwhm))
+        in->fwhm = NAN;
+}
+
+/* Sides from --size, or from the list's keyword FIELD: enough for whole detector pixels at every dither. */
+static void set_size(const struct input *in, const struct request *r, const char *name, struct view *v)
+{
+    double side[2] = {r->size[0], r->size[1]}, field;
+    if (!(side[0] > 0)) {
+        if (table_key_number(&in->list, "FIELD", &field) || !(field > 0))
+            die(EXIT_USAGE, "%s: no keyword FIELD: give --size NX,NY in output pixels", name);
+        double n = fmax(1, rint(field / r->pixel));
+        side[0] = side[1] = (double)r->subpixel * n + (double)r->subpixel - 1;
+    }
+    if (!(side[0] >= 1 && side[1] >= 1 && side[0] <= 65535 && side[1] <= 65535))
+        die(EXIT_USAGE, "an image of %.0f x %.0f pixels: sides are 1 to 65535", side[0], side[1]);
+    v->nx = (long)side[0];
+    v->ny = (long)side[1];
+}
+
+/* Header of the image: units, scale, shear, PSF, accuracy, WCS. */
+static int describe(struct header *h, const struct input *in, const struct request *r, const struct view *v)
+{
+    int st = header_set_str(h, "BUNIT", "electron", "expected electrons per pixel");
+    const char *seed = table_text(&in->list, "SEED");
+    const struct { const char *key; double value; const char *what; } card[] = {
+        {"EXPTIME", r->exptime, "exposure time, s"},
+        {"GAIN", 1, "electron per BUNIT"},
+        {"MAGZERO", r->zeropoint + 2.5 * log10(r->exptime), "AB magnitude of 1 electron"},
+        {"PIXSCALE", v->pixel, "arcsec per pixel"},
+        {"CCDSCALE", r->pixel, "arcsec per detector pixel"},
+        {"SHEAR1", r->shear[0], "reduced shear of the field, along x"},
+        {"SHEAR2", r->shear[1], "reduced shear of the field, along y = x"},
+        {"ACCURACY", r->accuracy.eps, "error of a pixel over the object's peak"},
+        {"FLOOR", r->accuracy.floor, "error of a pixel allowed always, electron"},
+    };
+    for (size_t i = 0; st == OK && i < sizeof card / sizeof *card; i++)
+        st = header_set_double(h, card[i].key, card[i].value, card[i].what);
+    if (st == OK)
+        st = header_set_long(h, "SHEARORD", r->order, "order of the shear series; 0 is exact");
+    if (st == OK && r->set)
+        st = header_set_str(h, "SETNAME", r->set, "set of simulations");
+    if (st == OK && seed)
+        st = header_set_str(h, "SEED", seed, "seed of the scene list");
+    if (st == OK && r->psf) {
+        st = header_set_str(h, "PSFFILE", in->psf.base, "PSF");
+        if (st == OK && isfinite(in->fwhm))
+            st = header_set_double(h, "PSFFWHM", in->fwhm, "FWHM of PSF and charge diffusion, arcsec");
+        if (st == OK)
+            st = header_set_double(h, "CHDIFF", in->otf.chdiff + r->diffusion, "charge diffusion, rms, arcsec");
+    }
+    if (st == OK)
+        st = header_set_bool(h, "PIXRESP", !v->no_pixel || in->otf.pixel > 0, "the square pixel is in");
+    if (st == OK)
+        st = sky_set_tan(h, v->pixel, 0.5 * ((double)v->nx + 1), 0.5 * ((double)v->ny + 1), r->centre[0], r->centre[1]);
+    return st;
+}
+
+/* Pixel positions of the objects, from the first centre = 0. */
+static void positions(const struct input *in, const struct view *v, const struct header *h, double *x, double *y)
+{
+    const struct scene *s = &in->scene;
+    for (size_t i = 0; i < s->n; i++) {
+        x[i] = s->object[i].x;
+        y[i] = s->object[i].y;
+        if (s->where == SCENE_FIELD) {
+            x[i] = 0.5 * ((double)v->nx - 1) + x[i] / v->pixel;
+            y[i] = 0.5 * ((double)v->ny - 1) + y[i] / v->pixel;
+        } else if (s->where == SCENE_PIXEL) {
+            x[i] -= 1;
+            y[i] -= 1;
+        }
+    }
+    if (s->where != SCENE_SKY || s->n == 0)
+        return;
+    struct sky *sky;
+    struct err e;
+    if (sky_open(&sky, h, &e))
+        die(EXIT_RUN, "%s", e.text);
+    int st = sky_to_pixel(sky, s->n, x, y, x, y);      /* positions behind the sky are NaN: counted by the plan */
+    if (st && st != E_RANGE)
+        check(st);
+    sky_close(sky);
+}
+
+/* ---- plan ---- */
+
+static void print_plan(FILE *f, const struct plan *p, const struct request *r)
+{
+    static const char *const path[PATH_COUNT] = {"outside or dark", "points", "closed-form pixels",
+                                                 "mapped pixels (Gauss-Legendre)", "Fourier stamps"};
+    const struct view *v = &p->view;
+    fprintf(f, "simage: %ld x %ld pixels of %g\", %zu parts\n", v->nx, v->ny, v->pixel, p->n);
+    fprintf(f, "simage: effects:%s%s%s%s\n", v->psf ? " PSF" : "", v->diffusion > 0 ? " diffusion" : "",
+            v->no_pixel ? "" : " pixel", r->shear[0] != 0 || r->shear[1] != 0 ? " shear" : "");
+    for (int i = 0; i < PATH_COUNT; i++)
+        if (p->count[i])
+            fprintf(f, "simage: %zu %s\n", p->count[i], path[i]);
+    for (int g = 0; g < p->n_grid; g++) {
+        size_t n = 0;
+        for (size_t i = 0; i < p->n; i++)
+            n += p->draw[i].path == PATH_FOURIER && p->draw[i].grid == g;
+        fprintf(f, "simage: %zu stamps of %d x %d, %d frequencies per axis\n", n, p->grid[g].n, p->grid[g].n,
+                2 * p->grid[g].kmax + 1);
+    }
+    fprintf(f, "simage: accuracy %g of the peak, floor %g electron; %zu transforms, %d shear matrices; about %.2g s and %.0f MB\n",
+            p->acc.eps, p->acc.floor, p->fft_plans, p->n_matrix, p->cost,
+            1e-6 * (p->bytes + 4.0 * (double)v->nx * (double)v->ny) + 8);
+}
+
+static void report(const struct plan *p, const struct common *c)
+{
+    if (c->quiet)
+        return;
+    if (p->n_bad)
+        warn("%s: %zu objects cannot be drawn (a position or flux that is no number, or order above 66 and turned): left out",
+             c->argv[0], p->n_bad);
+    if (p->n_short)
+        warn("%s: %zu stamps end at %d pixels: wings beyond are missing", c->argv[0], p->n_short, p->acc.side_max);
+}
+
+static void make_plan(struct plan *p, const struct view *v, const struct request *r, const struct common *c,
+                      const struct emission *e)
+{
+    int st = scene_plan(p, v, &r->accuracy, e->n, e->emitter);
+    if (st == E_RANGE)
+        die(EXIT_RUN, "%s: the PSF's cut-off and the pixels do not fit: fewer than 64 bands are possible", r->psf ? r->psf : "-");
+    check(st);
+    if (p->bytes + 4.0 * (double)v->nx * (double)v->ny > c->max_memory)
+        die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", c->argv[0],
+            1e-6 * (p->bytes + 4.0 * (double)v->nx * (double)v->ny));
+    if (c->check || c->verbose)
+        print_plan(stderr, p, r);
+    report(p, c);
+}
+
+static void draw(const struct plan *p, struct image *im, const struct common *c)
+{
+    struct progress bar;
+    size_t todo = p->n - p->count[PATH_NONE];
+    progress_begin(&bar, "simage", (long)todo, c->quiet);
+    int st = scene_render(p, im, c->threads, &bar);
+    progress_end(&bar);
+    check(st);
+}
+
+static void run(const struct request *r, const struct common *c, const char *record)
+{
+    struct input in = {0};
+    struct view v = {.pixel = r->pixel / (double)r->subpixel, .no_pixel = r->no_pixel, .g1 = r->shear[0], .g2 = r->shear[1],
+                     .shear_order = r->order};
+    struct image im = {0};
+    struct emission emission = {0};
+    struct plan plan = {0};
+    struct err e;
+    read_scene(&in, r, c);
+    read_psf(&in, r, c, &v);
+    set_size(&in, r, c->argv[0], &v);
+    check(describe(&im.hdr, &in, r, &v));
+
+    double *x = malloc((2 * in.scene.n + 1) * sizeof *x);
+    if (!x)
+        check(E_NOMEM);
+    positions(&in, &v, &im.hdr, x, x + in.scene.n);
+    int st = emission_new(&emission, &in.scene, &in.models, x, x + in.scene.n, r->exptime);
+    if (st == E_RANGE)
+        die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
+    check(st);
+    make_plan(&plan, &v, r, c, &emission);
+    if (!c->check) {
+        struct header h = im.hdr;
+        check(image_new(&im, v.nx, v.ny));
+        im.hdr = h;
+        draw(&plan, &im, c);
+        const char *inputs[] = {c->argv[0], r->models ? r->models : c->argv[0], r->psf ? r->psf : c->argv[0]};
+        if (image_write(&im, c->out, record, inputs, 3, &e))
+            die(EXIT_RUN, "%s", e.text);
+    }
+    plan_free(&plan);
+    emission_free(&emission);
+    free(x);
+    image_free(&im);
+    otf_free(&in.otf);
+    scene_free(&in.scene);
+    models_free(&in.models);
+    table_free(&in.catalogue);
+    table_free(&in.list);
+}
+
+int main(int argc, char **argv)
+{
+    struct common c = COMMON_DEFAULTS;
+    struct request r = {.subpixel = 1, .exptime = 2000, .zeropoint = 26.65, .centre = {150, 2.2}, .accuracy = ACCURACY_DEFAULT};
+    const struct program prog = {
+        "simage", "Draw the expected electrons of a scene: shear, PSF, charge diffusion, pixels.", "[SCENE]", 0, 1,
+        "  simage scene.txt --models models.txt -p psf.fits -x 0.1 --shear 0.05,0 -o image.fits\n"
+        "  simage stars.txt -p psf.fits -x 0.1 --size 800,800 | addnoise --depth 27.7 | detect -\n"
+    };
+    const struct opt own[] = {
+        {"models", 'm', OPT_STR, &r.models, 0, 0, "FILE", "shapelet catalogue of the objects", 0, 1},
+        {"psf", 'p', OPT_STR, &r.psf, 0, 0, "FILE", "PSF; without one there is none", 0, 1},
+        {"pixscale", 'x', OPT_REAL, &r.pixel, 1e-6, 1e6, "ARCSEC", "detector pixel, arcsec", 0, 0},
+        {"size", 0, OPT_PAIR, r.size, 1, 65535, "NX,NY", "output pixels; else from the list's FIELD", 0, 0},
+        {"shear", 'g', OPT_PAIR, r.shear, -1, 1, "G1,G2", "reduced shear of the field, area kept", 0, 0},
+        {"shear-order", 0, OPT_CHOICE, &r.order, 0, 0, 0, "exact, or the series of this order", "exact|1|2|3|4|5|6|7|8", 0},
+        {"subpixel", 'N', OPT_LONG, &r.subpixel, 1, 64, "N", "output pixels of PIXSCALE/N (for dither)", 0, 0},
+        {"exptime", 'T', OPT_REAL, &r.exptime, 1e-9, 1e12, "S", "exposure time, s", 0, 0},
+        {"zeropoint", 'z', OPT_REAL, &r.zeropoint, -50, 100, "MAG", "AB magnitude of 1 electron/s", 0, 0},
+        {"accuracy", 0, OPT_REAL, &r.accuracy.eps, 1e-12, 0.5, "EPS", "pixel error over the object's peak", 0, 0},
+        {"floor", 0, OPT_REAL, &r.accuracy.floor, 0, 1e12, "E", "pixel error allowed always, electrons", 0, 0},
+        {"no-pixel", 0, OPT_FLAG, &r.no_pixel, 0, 0, 0, "values at pixel centres, not integrals", 0, 0},
+        {"diffusion", 0, OPT_REAL, &r.diffusion, 0, 1e3, "ARCSEC", "charge diffusion on top of the PSF, rms", 0, 0},
+        {"center", 0, OPT_PAIR, r.centre, -360, 360, "RA,DEC", "sky position of the field centre, deg", 0, 0},
+        {"set", 0, OPT_STR, &r.set, 0, 0, "NAME", "name of the set, keyword SETNAME", 0, 0},
+        {"psf-scale", 0, OPT_REAL, &r.psf_options.scale, 1e-9, 1e6, "ARCSEC", "sampling of the PSF, over its header", 0, 0},
+        {"psf-cutoff", 0, OPT_REAL, &r.psf_options.cutoff, 1e-9, 1e9, "U", "its highest frequency, cycles/arcsec", 0, 0},
+        {"psf-has-pixel", 0, OPT_FLAG, &r.psf_options.has_pixel, 0, 0, 0, "the PSF contains the pixel", 0, 0},
+        {"psf-normalise", 0, OPT_FLAG, &r.psf_options.normalise, 0, 0, 0, "divide the PSF by its sum", 0, 0},
+        {0}
+    };
+    opt_parse(&prog, own, &c, argc, argv);
+    check_options(&r, own, &c);
+    char *record = opt_record(&prog, own, &c);
+    run(&r, &c, record);
+    free(record);
+    return EXIT_DONE;
+}

@@ -1,0 +1,132 @@
+# simage: flux and positions by hand, header, dither identity, sizes, types,
+# shear, threads, faults.
+F="perl $TOP/tests/fits.pl"
+cat >one.txt <<'END'
+# DX DY FLUX TYPE
+0 0 2 star
+END
+stat() { $F stat "$1" "${3:-0}" | cut -d' ' -f"$2"; }
+ok "a star without PSF" simage one.txt -x 0.1 --size 5,7 -o star.fits
+near "its flux, 2 e/s for 2000 s" "$(stat star.fits 4)" 4000 0
+near "the rest is empty" "$(stat star.fits 1)" "$(awk 'BEGIN { printf "%.12f", 4000 / 35 }')" 1e-6
+for k in "BUNIT electron" "EXPTIME 2000." "GAIN 1." "PIXSCALE 0.1" "CCDSCALE 0.1" "SHEAR1 0." "ACCURACY 1E-05" "FLOOR 0." "PIXRESP T" "CRPIX1 3." "CRPIX2 4."; do
+    set -- $k
+    got=$(card star.fits "$1")
+    case $2 in
+    [a-zA-Z]*) [ "$got" = "$2" ] && pass "$1 = $2" || fail "$1 = $got, not $2" ;;
+    *) near "$1" "$got" "$2" 1e-12 ;;
+    esac
+done
+near "MAGZERO" "$(card star.fits MAGZERO)" "$(awk 'BEGIN { printf "%.12f", 26.65 + 2.5 * log(2000) / log(10) }')" 1e-9
+[ -z "$(card star.fits PSFFILE)" ] && pass "no PSFFILE without a PSF" || fail "PSFFILE without a PSF"
+
+# a Gaussian galaxy of half-light radius 0.3": half the light inside, pixel integrals by erf
+cat >gauss.txt <<'END'
+# DX DY MAG TYPE RE
+0.02 -0.03 20 gauss 0.3
+END
+ok "a Gaussian without PSF" simage gauss.txt -x 0.1 --size 61,61 --accuracy 1e-9 -o g.fits
+flux=$(awk 'BEGIN { printf "%.6f", 2000 * 10 ^ (-0.4 * (20 - 26.65)) }')
+near "flux = 10^(-0.4 (m - zeropoint)) T" "$(stat g.fits 1)" "$(awk -v f="$flux" 'BEGIN { printf "%.9f", f / 3721 }')" "$(awk -v f="$flux" 'BEGIN { print 6e-8 * f / 3721 }')"
+ok "sheared along x" simage gauss.txt -x 0.1 --size 61,61 --shear 0.2,0 -o gx.fits
+ok "sheared, series of order 8" simage gauss.txt -x 0.1 --size 61,61 --shear 0.05,0.02 --shear-order 8 --accuracy 1e-8 -o g8.fits
+ok "sheared, exact" simage gauss.txt -x 0.1 --size 61,61 --shear 0.05,0.02 --accuracy 1e-8 -o ge.fits
+ok "sheared, order 1" simage gauss.txt -x 0.1 --size 61,61 --shear 0.05,0.02 --shear-order 1 --accuracy 1e-8 -o g1.fits
+peak=$(stat ge.fits 4)
+diffmax() { # largest |a - b|
+    perl -e 'my @v; for my $f (@ARGV) { open my $h, "<:raw", $f or die; local $/; my $d = <$h>; my $o = 0; my $end = 0;
+        until ($end) { my $b = substr($d, $o, 2880); $o += 2880; $end = $b =~ /(?:^|.{80})*?END {77}/s && grep { substr($b, 80 * $_, 80) =~ /^END {77}$/ } 0 .. 35; }
+        push @v, [unpack "f>*", substr($d, $o, 4 * $ENV{NPIX})]; }
+        my $m = 0; for my $i (0 .. $ENV{NPIX} - 1) { my $x = abs($v[0][$i] - $v[1][$i]); $m = $x if $x > $m } printf "%.9g\n", $m' "$1" "$2"
+}
+export NPIX=3721
+near "order 8 = exact, of the peak" "$(diffmax g8.fits ge.fits | awk -v p="$peak" '{ print $1 / p }')" 0 3e-7
+between "order 1 is not, of the peak" "$(diffmax g1.fits ge.fits | awk -v p="$peak" '{ print $1 / p }')" 1e-4 5e-3
+
+# types: a Sersic profile of n = 1/2 is a Gaussian; n = 4 keeps its flux and half-light radius
+sed 's/gauss 0.3/sersic 0.3 0.5/; s/ RE/ RE N/' gauss.txt >s05.txt
+ok "Sersic n = 0.5" simage s05.txt -x 0.1 --size 61,61 --accuracy 1e-9 -o s05.fits
+near "n = 0.5 = Gaussian" "$(diffmax g.fits s05.fits)" 0 0
+printf '# DX DY FLUX TYPE RE N Q PA\n0 0 1 sersic 0.5 1 0.6 30\n' >disc.txt
+ok "an inclined disc" simage disc.txt -x 0.1 --size 401,401 -T 1 --accuracy 1e-7 -o disc.fits
+near "its flux" "$(awk -v m="$(stat disc.fits 1)" 'BEGIN { print m * 160801 }')" 1 1e-3
+
+# PSF from a Gaussian image of rms 0.08": flux, phase, subpixels, interlacing
+$F make psf.fits 161 161 'exp(-(($x-80)**2+($y-80)**2)/128)' "PIXELSCL=                 0.01" >/dev/null
+S="-p psf.fits --psf-normalise --psf-cutoff 12"
+printf '# X_IMAGE Y_IMAGE FLUX TYPE RE\n20.3 21.7 1 gauss 0.2\n22 19 0.3 star 0.1\n' >two.txt
+ok "with a PSF" simage two.txt $S -x 0.1 --size 40,42 --shear 0.03,0.04 --accuracy 1e-7 -o p.fits
+near "PSF: flux" "$(awk -v m="$(stat p.fits 1)" 'BEGIN { print m * 1680 }')" 2600 0.01
+[ "$(card p.fits PSFFILE)" = psf.fits ] && pass "PSFFILE" || fail "PSFFILE $(card p.fits PSFFILE)"
+# sum of two widths: Gaussian PSF and Gaussian galaxy: peak of exp(-r2/2s2), s2 = .08^2 + .2^2/(2 ln 2) + pixel
+printf '# DX DY FLUX TYPE RE\n0 0 1 gauss 0.2\n' >c.txt
+ok "one Gaussian through a Gaussian PSF" simage c.txt $S -x 0.02 --size 141,141 --accuracy 1e-8 -T 1 -o c.fits
+near "its peak pixel" "$(stat c.fits 4)" "$(awk 'BEGIN { s = 0.0064 + 0.04 / (2 * log(2)); printf "%.9f", 0.0004 / (2 * atan2(0, -1) * s) * (1 - 0.0004 / (12 * s)) }')" 2e-9
+printf '# DX DY FLUX TYPE RE\n0.013 -0.021 1 gauss 0.2\n-0.3 0.4 2 star 0.2\n' >d.txt
+ok "detector pixels" simage d.txt $S -x 0.1 --size 32,32 --accuracy 1e-9 -o full.fits
+ok "half pixels" simage d.txt $S -x 0.1 -N 2 --size 64,64 --accuracy 1e-9 -o half.fits
+near "PIXSCALE of half pixels" "$(card half.fits PIXSCALE)" 0.05 1e-15
+near "CCDSCALE of half pixels" "$(card half.fits CCDSCALE)" 0.1 1e-15
+perl -e 'my @v; for my $f (["full.fits", 1024], ["half.fits", 4096]) { open my $h, "<:raw", $f->[0] or die; local $/; my $d = <$h>; my $o = 0;
+    for (;;) { my $b = substr $d, $o, 2880; $o += 2880; last if grep { substr($b, 80 * $_, 80) =~ /^END {77}$/ } 0 .. 35 } push @v, [unpack "f>*", substr $d, $o, 4 * $f->[1]] }
+    my ($m, $p) = (0, 0); for my $y (0 .. 31) { for my $x (0 .. 31) { my $f = $v[0][32 * $y + $x]; my $s = 0;
+    $s += $v[1][64 * (2 * $y + $_->[0]) + 2 * $x + $_->[1]] for [0,0],[0,1],[1,0],[1,1]; my $e = abs($s - $f); $m = $e if $e > $m; $p = $f if $f > $p } } printf "%.3g\n", $m / $p' >inter
+near "2 x 2 half pixels = one pixel, of the peak (float32)" "$(cat inter)" 0 2e-7
+
+# size from the list
+printf '# Keyword: FIELD = 1.24\n# DX DY FLUX TYPE\n0 0 1 star\n' >field.txt
+ok "size from FIELD" simage field.txt -x 0.1 -o f.fits
+near "NAXIS1 = round(FIELD / scale)" "$(card f.fits NAXIS1)" 12 0
+ok "size from FIELD, half pixels" simage field.txt -x 0.1 -N 2 -o f.fits
+near "NAXIS1 = N n + N - 1" "$(card f.fits NAXIS1)" 25 0
+# a sky position and the same place in pixels
+printf '# RA DEC FLUX TYPE\n150 2.2 1 star\n' >sky.txt
+ok "RA DEC" simage sky.txt -x 0.1 --size 5,7 -T 4000 -o k.fits
+near "the field centre is the middle" "$(diffmax k.fits star.fits)" 0 0
+
+# bytes do not depend on threads or place
+galgen --field 20 -n 150 --models m.txt -o scene.txt
+for p in "" "$S"; do
+    ok "1 thread${p:+ with a PSF}" simage scene.txt --models m.txt $p -x 0.1 --shear 0.03,0.02 -o a.fits
+    ok "2 threads${p:+ with a PSF}" simage scene.txt --models m.txt $p -x 0.1 --shear 0.03,0.02 -j 2 -o b.fits
+    same "same bytes${p:+ with a PSF}" a.fits b.fits
+done
+mkdir -p sub && (cd sub && simage ../scene.txt --models ../m.txt -p ../psf.fits --psf-normalise --psf-cutoff 12 -x 0.1 --shear 0.03,0.02 -o b.fits)
+same "same bytes in another directory" a.fits sub/b.fits
+simage - --models m.txt $S -x 0.1 --shear 0.03,0.02 <scene.txt >c.fits
+near "list and image through pipes" "$(diffmax c.fits a.fits)" 0 0
+fitsverify -q a.fits >v.txt 2>&1 && pass "fitsverify" || { command -v fitsverify >/dev/null && fail "fitsverify: $(cat v.txt)" || skip "fitsverify is not there"; }
+
+# plan: what is not asked for is not made
+simage scene.txt --models m.txt -x 0.1 --check >plan.out 2>plan.txt && [ ! -s plan.out ] && pass "--check writes no image" || fail "--check"
+grep -q ' 0 transforms' plan.txt && pass "no PSF: no transform" || fail "no PSF: $(grep transforms plan.txt)"
+simage scene.txt --models m.txt $S -x 0.1 --check 2>plan.txt
+grep -q ' effects: PSF pixel$' plan.txt && pass "effects listed" || fail "effects: $(grep effects plan.txt)"
+
+# an object that cannot be drawn is left out, counted, and the run goes on
+printf '# X_IMAGE Y_IMAGE FLUX TYPE\n9e6 3 1 star\n3 3 1 star\n' >far.txt
+ok "an object 9e6 pixels away" simage far.txt -x 0.1 --size 5,5 -o far.fits
+near "the other is drawn" "$(stat far.fits 4)" 2000 0
+printf '# DX DY FLUX TYPE\n' >empty.txt
+ok "an empty list" simage empty.txt -x 0.1 --size 5,5 -o e.fits
+near "gives zeros" "$(stat e.fits 4)" 0 0
+
+# faults
+fails "no pixel scale" 2 simage one.txt --size 5,5
+fails "no size" 2 simage one.txt -x 0.1
+fails "a number with a tail" 2 simage one.txt -x 0.1x --size 5,5
+fails "shear of 1" 2 simage one.txt -x 0.1 --size 5,5 --shear 0.8,0.7
+fails "diffusion without a PSF" 2 simage one.txt -x 0.1 --size 5,5 --diffusion 0.04
+fails "half a pixel" 2 simage one.txt -x 0.1 --size 5.5,5
+fails "no such list" 1 simage none.txt -x 0.1 --size 5,5
+fails "no models" 1 simage scene.txt -x 0.1 -o x.fits
+$F make noscale.fits 21 21 1 "BUNIT   = 'electron'" >/dev/null
+fails "a PSF without a scale" 1 simage one.txt -x 0.1 --size 5,5 -p noscale.fits -o x.fits
+head -c 5000 psf.fits >cut.fits
+fails "a PSF cut short" 1 simage one.txt -x 0.1 --size 5,5 -p cut.fits -o x.fits
+$F make diffused.fits 21 21 'exp(-(($x-10)**2+($y-10)**2)/20)' "PIXELSCL=                 0.01" "CHDIFF  =                 0.04" >/dev/null
+fails "diffusion twice" 1 simage one.txt -x 0.1 --size 5,5 -p diffused.fits --psf-normalise --diffusion 0.04 -o x.fits
+$F make pixel.fits 21 21 'exp(-(($x-10)**2+($y-10)**2)/20)' "PIXELSCL=                 0.01" "PIXRESP =                    T" "PIXSIZE =                  0.2" >/dev/null
+fails "a pixel twice" 1 simage one.txt -x 0.1 --size 5,5 -p pixel.fits --psf-normalise -o x.fits
+fails "an unknown type" 1 simage <(printf '# DX DY FLUX TYPE\n0 0 1 blob\n') -x 0.1 --size 5,5 -o x.fits
+[ ! -e x.fits ] && pass "no output after a fault" || fail "output after a fault"
