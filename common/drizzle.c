@@ -489,6 +489,32 @@ int drizzle_rows(enum drizzle_kernel kernel, double pixfrac, const struct drizzl
     return rows_general(&j);
 }
 
+/* Any of n drops along an axis on two cells? */
+static int axis_splits(double x0, double xx, double half, long n)
+{
+    for (long i = 0; i < n; i++) {
+        const double X = (double)i;
+        const struct span s = span_of(rounded(x0 + xx * (X - half)), rounded(x0 + xx * (X + half)));
+        if (s.last > s.first)
+            return 1;
+    }
+    return 0;
+}
+
+int drizzle_splits(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *m, long nx, long ny)
+{
+    const double half = 0.5 * pixfrac;
+    if (kernel == DRIZZLE_POINT || pixfrac * m->scale <= SMALL)
+        return 0;
+    if ((kernel != DRIZZLE_SQUARE && kernel != DRIZZLE_TURBO) || m->node_x)
+        return 1;
+    if (m->xy == 0 && m->yx == 0)
+        return axis_splits(m->x0, m->xx, half, nx) || axis_splits(m->y0, m->yy, half, ny);
+    if (m->xx == 0 && m->yy == 0)
+        return axis_splits(m->x0, m->xy, half, ny) || axis_splits(m->y0, m->yx, half, nx);
+    return 1;
+}
+
 double drizzle_noise_factor(enum drizzle_kernel kernel, double pixfrac, double ratio)
 {
     const double r = pixfrac * ratio;

@@ -82,6 +82,12 @@ struct drizzle_band {
 MUST_CHECK int drizzle_rows(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map,
                             const struct drizzle_input *in, struct drizzle_band *band);
 
+/*
+ * 0 when every drop of an nx x ny exposure falls on one output pixel (points, and
+ * interlaced squares), so that output pixels stay independent.
+ */
+int drizzle_splits(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map, long nx, long ny);
+
 /* Largest distance in output pixels between a drop's centre and a pixel centre it reaches. */
 double drizzle_reach(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map);
 

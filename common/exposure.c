@@ -129,13 +129,36 @@ int exposure_rescale_wcs(struct header *h, double shift_x, double shift_y, doubl
     return st;
 }
 
+/* Keywords of world coordinates; a trailing star stands for the rest of the name. */
+static const char *const wcs_keys[] = {
+    "WCSAXES*", "WCSNAME*", "CTYPE*", "CRVAL*", "CRPIX*", "CDELT*", "CUNIT*", "CROTA*", "CD1_*", "CD2_*",
+    "PC1_*", "PC2_*", "PV1_*", "PV2_*", "PS1_*", "PS2_*", "LONPOLE*", "LATPOLE*", "RADESYS*", "RADECSYS",
+    "EQUINOX*", "A_*", "B_*", "AP_*", "BP_*",
+};
+enum { WCS_KEYS = sizeof wcs_keys / sizeof *wcs_keys };
+
 void exposure_remove_wcs(struct header *h)
 {
-    static const char *const keys[] = {
-        "WCSAXES*", "WCSNAME*", "CTYPE*", "CRVAL*", "CRPIX*", "CDELT*", "CUNIT*", "CROTA*", "CD1_*", "CD2_*",
-        "PC1_*", "PC2_*", "PV1_*", "PV2_*", "PS1_*", "PS2_*", "LONPOLE*", "LATPOLE*", "RADESYS*", "RADECSYS",
-        "EQUINOX*", "A_*", "B_*", "AP_*", "BP_*", "A_ORDER", "B_ORDER", "AP_ORDER", "BP_ORDER",
-    };
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-        header_remove(h, keys[i]);
+    for (size_t i = 0; i < WCS_KEYS; i++)
+        header_remove(h, wcs_keys[i]);
+}
+
+static int is_wcs(const char *card)
+{
+    const size_t length = strcspn(card, " =");
+    for (size_t i = 0; i < WCS_KEYS; i++) {
+        const size_t n = strcspn(wcs_keys[i], "*");
+        if (strncmp(card, wcs_keys[i], n) == 0 && (wcs_keys[i][n] == '*' || length == n))
+            return 1;
+    }
+    return 0;
+}
+
+int exposure_copy_wcs(struct header *to, const struct header *from)
+{
+    int st = OK;
+    for (size_t i = 0; i < from->n && st == OK; i++)
+        if (is_wcs(from->card[i]))
+            st = header_append(to, from->card[i]);
+    return st;
 }

@@ -47,4 +47,7 @@ MUST_CHECK int exposure_rescale_wcs(struct header *h, double shift_x, double shi
 /* Remove every WCS card (alternative systems and distortions too). */
 void exposure_remove_wcs(struct header *h);
 
+/* Append the WCS cards of `from`. */
+MUST_CHECK int exposure_copy_wcs(struct header *to, const struct header *from);
+
 #endif

@@ -162,7 +162,8 @@ static void interlace(void)
             in[e][i] = (float)(428 + 20 * (uni((uint64_t)i, (uint32_t)e) - 0.5));
         struct drizzle_map m = {.x0 = phase[e][0] + 1e-8, .y0 = phase[e][1] - 2e-8, .xx = 2 + 1e-9, .yy = 2 - 1e-9, .scale = 2};
         struct drizzle_input x = {.nx = N, .ny = N, .pix = in[e], .w = 500, .scale = 0.25 * (2000 / 500.0)};
-        if (drizzle_rows(DRIZZLE_SQUARE, 0.5, &m, &x, &b))
+        if (drizzle_rows(DRIZZLE_SQUARE, 0.5, &m, &x, &b) || drizzle_splits(DRIZZLE_SQUARE, 0.5, &m, N, N)
+            || !drizzle_splits(DRIZZLE_SQUARE, 0.6, &m, N, N))
             bad++;
     }
     for (int y = 0; y < 2 * N; y++)

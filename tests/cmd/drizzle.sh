@@ -1,0 +1,155 @@
+# drizzle: the paper's interlace as an exact copy, grids, units, keywords, weights,
+# context, order and threads, the reference images, refusals.
+F="perl $TOP/tests/fits.pl"
+wcs() { # CRPIX1 CRPIX2 SCALE_DEG
+    printf '%s\n' "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRVAL1  = 150.0" "CRVAL2  = 2.2" "CRPIX1  = $1" "CRPIX2  = $2" "CD1_1   = -$3" "CD1_2   = 0.0" "CD2_1   = 0.0" "CD2_2   = $3"
+}
+common=("BUNIT   = 'electron'" "MAGZERO = 34.0" "EXPTIME = 2000.0" "CCDSCALE= 0.2" "PIXSCALE= 0.1")
+mapfile -t W < <(wcs 20.5 18.0 2.777777777777778E-5)
+expr='100 + 50 * exp(-(($x - 19) ** 2 + ($y - 17) ** 2) / 60)'
+$F make fine.fits 41 37 "$expr" "${common[@]}" "${W[@]}"
+dither -n 2 fine.fits -o four.fits
+addnoise -s 3 four.fits -o noisy.fits
+
+# ---- interlace: every output pixel is one input pixel, bit for bit
+ok "interlace" drizzle noisy.fits -x 0.1 --pixfrac 0.5 -o d.fits
+near "HDUs: SCI, WHT, CTX" "$($F count d.fits)" 4 0
+near "NAXIS1" "$($F card d.fits 1 NAXIS1)" 40 0
+near "NAXIS2" "$($F card d.fits 1 NAXIS2)" 36 0
+for e in 1 2 3 4; do $F dump noisy.fits $e | awk -v a="$(awk "BEGIN { print ($e == 2 || $e == 3) }")" -v b="$(awk "BEGIN { print ($e > 2) }")" '{ print 2 * $1 + a, 2 * $2 + b, $3 }'; done | sort -k2n -k1n >want.txt
+$F dump d.fits 1 | sort -k2n -k1n >got.txt
+same "an exact copy of the four exposures" got.txt want.txt
+near "EXPTIME" "$($F card d.fits 1 EXPTIME)" 2000 0
+near "GAIN" "$($F card d.fits 1 GAIN)" 1 0
+near "MAGZERO: of the whole exposure" "$($F card d.fits 1 MAGZERO)" 34 1e-9
+near "PIXSCALE" "$($F card d.fits 1 PIXSCALE)" 0.1 1e-9
+near "CCDSCALE" "$($F card d.fits 1 CCDSCALE)" 0.2 0
+near "NOISECOR" "$($F card d.fits 1 NOISECOR)" 1 0
+near "NCOMBINE" "$($F card d.fits 1 NCOMBINE)" 4 0
+# pixel (k,l) is centred on the corner of the small pixels: CRPIX moves by half of one
+near "CRPIX1" "$($F card d.fits 1 CRPIX1)" 20 1e-7
+near "CRPIX2" "$($F card d.fits 1 CRPIX2)" 17.5 1e-7
+[ "$($F card d.fits 1 EXPNUM)$($F card d.fits 1 DITHERX)" = "" ] && pass "no EXPNUM, DITHERX left" || fail "EXPNUM or DITHERX left"
+near "WHT: seconds" "$($F stat d.fits 2 | cut -d' ' -f1)" 500 0
+near "WHT: the same everywhere" "$($F stat d.fits 2 | cut -d' ' -f2)" 0 0
+near "CTX at (1,1): third exposure" "$($F dump d.fits 3 | awk '$1 == 1 && $2 == 1 { print $3 }')" 4 0
+drizzle noisy.fits -x 0.1 --pixfrac 0.5 --flat -o flat.fits
+$F dump flat.fits 0 | sort -k2n -k1n >flat.txt
+same "--flat: the same image, in the primary" flat.txt got.txt
+near "--flat: one HDU" "$($F count flat.fits)" 1 0
+dither -n 2 fine.fits | addnoise -s 3 | drizzle -x 0.1 --pixfrac 0.5 --flat >p.fits
+$F dump p.fits 0 | sort -k2n -k1n >p.txt
+same "through pipes" p.txt got.txt
+
+# ---- order of the operands, threads
+for e in 1 2 3 4; do addnoise -q --saturate 1e9 -s 3 "four.fits[SCI,$e]" -o e$e.fits; done
+drizzle e1.fits e2.fits e3.fits e4.fits -x 0.07 --pixfrac 0.9 -o o1.fits
+drizzle e3.fits e1.fits e4.fits e2.fits -x 0.07 --pixfrac 0.9 -o o2.fits
+same "order of the operands" o1.fits o2.fits
+drizzle -j 2 e1.fits e2.fits e3.fits e4.fits -x 0.07 --pixfrac 0.9 -o o2.fits
+same "1 and 2 threads" o1.fits o2.fits
+drizzle -j 7 --kernel lanczos3 e1.fits e2.fits -x 0.07 -o o1.fits; drizzle --kernel lanczos3 e1.fits e2.fits -x 0.07 -o o2.fits
+same "1 and 7 threads, lanczos3" o1.fits o2.fits
+# without EXPNUM the content decides
+mapfile -t W1 < <(wcs 8.0 8.0 5.555555555555556E-5); mapfile -t W2 < <(wcs 8.3 7.9 5.555555555555556E-5)
+$F make a.fits 15 15 '$x + $y' "EXPTIME = 100.0" "${W1[@]}"
+$F make b.fits 15 15 '2 * $x + 7' "EXPTIME = 300.0" "${W2[@]}"
+drizzle a.fits b.fits -o o1.fits; drizzle b.fits a.fits -o o2.fits
+same "order of operands without EXPNUM" o1.fits o2.fits
+
+# ---- flux and units: two exposures of a constant rate of 2 per second and input pixel
+$F make a.fits 15 15 200 "EXPTIME = 100.0" "BUNIT   = 'electron'" "MAGZERO = 30.0" "${W1[@]}"
+$F make b.fits 15 15 600 "EXPTIME = 300.0" "BUNIT   = 'electron'" "MAGZERO = $(awk 'BEGIN { printf "%.12f", 30 + 2.5 * log(3) / log(10) }')" "${W2[@]}"
+middle() { $F dump "$1" 1 | awk '$1 == 15 && $2 == 15 { print $3 }'; }
+for u in total:200 rate:0.5 mean:125; do
+    drizzle a.fits b.fits -x 0.1 --units ${u%:*} -o u.fits
+    near "--units ${u%:*}" "$(middle u.fits)" ${u#*:} 1e-4
+    # value of a pixel as a magnitude: the same in every unit
+    near "--units ${u%:*}: MAGZERO" "$(awk -v v="$(middle u.fits)" -v z="$($F card u.fits 1 MAGZERO)" 'BEGIN { print z - 2.5 * log(v) / log(10) }')" "$(awk 'BEGIN { print 25 - 2.5 * log(0.5) / log(10) }')" 1e-5
+    near "--units ${u%:*}: GAIN times value = electrons" "$(awk -v v="$(middle u.fits)" -v g="$($F card u.fits 1 GAIN)" 'BEGIN { print v * g }')" 200 1e-3
+done
+near "NOISECOR, r = 2" "$($F card u.fits 1 NOISECOR)" 2.4 1e-9
+drizzle a.fits -o same.fits --flat
+near "one exposure on its own grid: unchanged" "$($F stat same.fits 0 | cut -d' ' -f1-5 | tr ' ' _ | sed 's/^200_0_200_200_225$/1/')" 1 0
+
+# total flux is kept by a turned grid that holds everything
+mapfile -t T < <(printf '%s\n' "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRVAL1  = 150.0" "CRVAL2  = 2.2" "CRPIX1  = 40.3" "CRPIX2  = 41.1" "CD1_1   = -2.0E-5" "CD1_2   = 1.3E-5" "CD2_1   = 1.3E-5" "CD2_2   = 2.0E-5")
+$F make grid.fits 80 80 0 "${T[@]}"
+drizzle a.fits --like grid.fits --units mean --pixfrac 0.7 -o turned.fits
+paste -d' ' <($F dump turned.fits 1) <($F dump turned.fits 2 | cut -d' ' -f3) >sw.txt
+near "turned: sum of the weights = seconds times pixels" "$(awk '{ s += $4 } END { printf "%.6f", s }' sw.txt)" 22500 0.01
+near "turned: weighted flux" "$(awk '$4 > 0 { s += $3 * $4 } END { printf "%.6f", s }' sw.txt)" "$(awk 'BEGIN { printf "%.6f", 22500 * 200 * (2.0 ^ 2 + 1.3 ^ 2) / 5.555555555555556 ^ 2 }')" 0.6
+near "blank where nothing fell" "$($F dump turned.fits 1 | awk '$1 == 0 && $2 == 0 { print (tolower($3) ~ /nan/) }')" 1 0
+drizzle a.fits --like grid.fits --fill 0 -o turned.fits
+near "--fill 0" "$($F dump turned.fits 1 | awk '$1 == 0 && $2 == 0 { print $3 }')" 0 0
+
+# ---- weights: a map that blinds one exposure
+$F make wa.fits 15 15 '1'; $F make wb.fits 15 15 '$x < 8 ? 0 : 3'
+$F make c.fits 15 15 1000 "EXPTIME = 100.0" "BUNIT   = 'electron'" "${W1[@]}"
+drizzle a.fits c.fits --weight wa.fits --weight wb.fits --units mean -o w.fits
+near "weight map: left" "$($F dump w.fits 1 | awk '$1 == 3 && $2 == 5 { print $3 }')" 200 0
+near "weight map: right, (200 + 3 * 1000)/4" "$($F dump w.fits 1 | awk '$1 == 12 && $2 == 5 { print $3 }')" 800 1e-4
+near "weight map: sum" "$($F dump w.fits 2 | awk '$1 == 12 && $2 == 5 { print $3 }')" 4 0
+near "context: one exposure on the left" "$($F dump w.fits 3 | awk '$1 == 3 && $2 == 5 { print ($3 == 1 || $3 == 2) }')" 1 0
+near "context: both on the right" "$($F dump w.fits 3 | awk '$1 == 12 && $2 == 5 { print $3 }')" 3 0
+$F make nan.fits 15 15 '$x == 7 && $y == 7 ? 9**9**9/9**9**9 : 200' "EXPTIME = 100.0" "BUNIT   = 'electron'" "${W1[@]}"
+drizzle nan.fits a.fits --units mean -o n.fits
+near "a NaN pixel is filled by the other exposure" "$($F dump n.fits 1 | awk '$1 == 7 && $2 == 7 { print $3 }')" 200 0
+
+# 33 exposures: two context planes
+$F make many.fits 0 0 0
+for i in $(seq 33); do $F add many.fits 3 3 1 "EXTNAME = 'SCI     '" "EXTVER  = $i" "EXPNUM  = $i" "EXPTIME = 10.0" "${W1[@]}"; done
+drizzle many.fits -o m.fits
+near "33 exposures: planes" "$($F card m.fits 3 NAXIS3)" 2 0
+near "33 exposures: first plane full" "$($F dump m.fits 3 | head -1 | cut -d' ' -f3)" -1 0
+near "33 exposures: second plane" "$($F dump m.fits 3 | tail -1 | cut -d' ' -f3)" 1 0
+
+# the 0/360 seam
+mapfile -t S1 < <(wcs 8.0 8.0 5.555555555555556E-5 | sed 's/= 150.0/= 0.0005/'); mapfile -t S2 < <(wcs 8.0 8.0 5.555555555555556E-5 | sed 's/= 150.0/= 359.9995/')
+$F make s1.fits 15 15 7 "EXPTIME = 1.0" "${S1[@]}"; $F make s2.fits 15 15 7 "EXPTIME = 1.0" "${S2[@]}"
+ok "across the 0/360 seam" drizzle s1.fits s2.fits -o seam.fits
+between "seam: side of the output, 0.001 deg = 18 px apart" "$($F card seam.fits 1 NAXIS1)" 33 34
+
+# ---- reference images
+T=$SHARED/truth/drizzle
+if [ -d "$T" ] && python3=$(command -v /usr/bin/python3) && $python3 -c 'import astropy' 2>/dev/null; then
+    compare() { ok "$1" $python3 "$SHARED/tools/compare_drizzle.py" out.fits "$T/$2.fits.gz" --wht 'out.fits[WHT]' "$T/$2.fits.gz[WHT]" "${@:3}"; }
+    maps() { for i in 0 1 2 3; do printf -- '--weight\n%s\n' "$T/$1_in$i.fits.gz[WHT]"; done; }
+    for k in square:0.5 point:0.5 square:1.0; do
+        n=shift_${k%:*}_pf${k#*:}_exact; mapfile -t M < <(maps shift)
+        drizzle "$T"/shift_in[0-3].fits.gz "${M[@]}" --like "$T/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
+        compare "$n, 2e-6 rms" $n --rtol 1e-7
+    done
+    mapfile -t M < <(maps rot)
+    drizzle "$T"/rot_in[0-3].fits.gz "${M[@]}" --like "$T/rot_square_pf0.8_exact.fits.gz" --pixfrac 0.8 --units mean -o out.fits
+    compare "rot_square_pf0.8_exact, 2e-5 rms" rot_square_pf0.8_exact --rtol 2e-5 --atol 2e-5 --watol 2e-5
+    for k in turbo:0.5 gaussian:1.0; do
+        n=shift_${k%:*}_pf${k#*:}; mapfile -t M < <(maps shift)
+        drizzle "$T"/shift_in[0-3].fits.gz "${M[@]}" --like "$T/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
+        compare "$n, 1e-5 rms away from the frame" $n --border 8 --atol 1e-5
+    done
+    # STScI's lanczos reads a table with steps of 0.01: 1e-2 rms
+    mapfile -t M < <(maps shift)
+    drizzle "$T"/shift_in[0-3].fits.gz "${M[@]}" --like "$T/shift_lanczos3_pf1.0.fits.gz" --kernel lanczos3 --units mean -o out.fits
+    compare "lanczos3, 2e-2 rms (their table has steps of 0.01)" shift_lanczos3_pf1.0 --border 8 --atol 2e-2 --wrtol 1e-3
+else
+    skip "reference images or astropy are missing"
+fi
+
+# ---- refusals
+$F make bare.fits 8 8 1 "EXPTIME = 1.0"
+fails "no WCS" 1 drizzle bare.fits -o no.fits
+fails "two grids" 2 drizzle a.fits --like grid.fits -x 0.1 -o no.fits
+fails "weights for one of two" 2 drizzle a.fits b.fits --weight wa.fits -o no.fits
+$F make small.fits 7 7 1
+fails "weights of another size" 1 drizzle a.fits --weight small.fits -o no.fits
+$F make notime.fits 8 8 1 "${W1[@]}"
+fails "no EXPTIME and --units rate" 1 drizzle notime.fits --units rate -o no.fits
+fails "a grid of 10^9 pixels" 1 drizzle a.fits -x 1e-5 -o no.fits
+mapfile -t Z < <(wcs 8.0 8.0 0.0)
+$F make zero.fits 8 8 1 "${Z[@]}"
+fails "a singular WCS" 1 drizzle zero.fits -o no.fits
+fails "output is an input" 1 drizzle a.fits -o a.fits
+head -c 3000 a.fits >cut.fits
+fails "truncated input" 1 drizzle cut.fits -o no.fits
+[ ! -e no.fits ] && pass "no output left behind" || fail "a failed run left an output"
