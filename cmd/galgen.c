@@ -405,9 +405,13 @@ int main(int argc, char **argv)
         die(EXIT_RUN, "%s", e.text);
     if (c.check || c.verbose)
         print_plan(c.check ? stdout : stderr, &p);
-    if (c.check)
-        return EXIT_DONE;
 
+    if (c.check) {
+        models_free(&library);
+        table_free(&models);
+        free(c.argv);
+        return EXIT_DONE;
+    }
     char *record = opt_record(&prog, own, &c);
     if (p.stars)
         make_stars(&scene, &p, &c);
@@ -423,5 +427,6 @@ int main(int argc, char **argv)
     models_free(&library);
     table_free(&models);
     table_free(&scene);
+    free(c.argv);
     return EXIT_DONE;
 }

@@ -676,10 +676,14 @@ static int read_text(struct lines *s, struct table *t)
         st = err_set(s->e, E_DATA, "%s: the file is empty", s->name);
     if (!st)
         st = labels_join(s, &h);
+    if (st) {
+        labels_free(&h);
+        return st;
+    }
     int ragged = h.n && strcmp(h.col[h.n - 1].name, "COEFFS") == 0, open = 0;
     for (size_t i = 0; i < h.n; i++)
         open |= h.col[i].type == UNTYPED && !(ragged && i + 1 == h.n);
-    if (!st && open && line) {
+    if (open && line) {
         struct table names = {0};
         st = add_columns(s, &h, &names, ragged);
         if (!st)
