@@ -18,7 +18,7 @@ struct psfgen {
     double wavelength_nm, bandwidth_nm;
     long wavelengths, struts, cells, size;
     const char *zernike, *from;
-    double diffusion, pixel, scale, cutoff, from_scale;
+    double diffusion, pixel, scale, cutoff, from_scale, x, y;
     int normalise, has_pixel, force;
 };
 
@@ -111,7 +111,7 @@ static void check_options(const struct psfgen *g, const struct opt *own, const s
 {
     static const char *const tel[] = {"telescope", "diameter", "wavelength", "bandwidth", "wavelengths", "obscuration",
                                       "obscuration-offset", "struts", "strut-width", "strut-angle", "zernike", "pupil-grid"};
-    static const char *const file[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "normalise", "force"};
+    static const char *const file[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "x", "y", "normalise", "force"};
     for (size_t i = 0; g->from && i < sizeof tel / sizeof *tel; i++)
         if (opt_given(own, c, tel[i]))
             die(EXIT_USAGE, "option --%s: a PSF from a file has no telescope: leave out this or --from", tel[i]);
@@ -124,6 +124,7 @@ static void check_options(const struct psfgen *g, const struct opt *own, const s
 static void foreign_otf(const struct psfgen *g, const struct common *c, struct otf *t)
 {
     struct psf_options o = {.scale = g->from_scale, .cutoff = g->cutoff, .has_pixel = g->has_pixel,
+                            .at = isfinite(g->x) && isfinite(g->y), .x = g->x, .y = g->y,
                             .normalise = g->normalise, .max_memory = c->max_memory};
     struct psf_info info;
     struct err e;
@@ -238,7 +239,7 @@ int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
     struct psfgen g = {.pupil = telescope_preset(0)->pupil, .wavelength_nm = 820, .wavelengths = 8, .struts = 3, .cells = 256,
-                       .size = 513, .diffusion = 0.04, .scale = 0.02};
+                       .size = 513, .diffusion = 0.04, .scale = 0.02, .x = NAN, .y = NAN};
     const struct program prog = {
         .name = "psfgen", .what = "make a PSF file from a telescope's pupil: image and transfer function",
         .operands = "-o FILE", .min_operands = 0, .max_operands = 0,
@@ -265,6 +266,8 @@ int main(int argc, char **argv)
         {"psf-scale", 0, OPT_REAL, &g.from_scale, 1e-6, 1e3, "ARCSEC", "its sampling, over its header's", NULL, 0},
         {"psf-cutoff", 0, OPT_REAL, &g.cutoff, 1e-6, 1e6, "U", "its highest frequency, cycles/arcsec", NULL, 0},
         {"psf-has-pixel", 0, OPT_FLAG, &g.has_pixel, 0, 0, NULL, "its pixel is in, whatever PIXRESP says", NULL, 0},
+        {"x", 'X', OPT_REAL, &g.x, -1e6, 1e6, "X", "where a PSFEx model is evaluated, FITS pixels", NULL, 0},
+        {"y", 'Y', OPT_REAL, &g.y, -1e6, 1e6, "Y", "where a PSFEx model is evaluated, FITS pixels", NULL, 0},
         {"normalise", 0, OPT_FLAG, &g.normalise, 0, 0, NULL, "divide it by its flux", NULL, 0},
         {"force", 0, OPT_FLAG, &g.force, 0, 0, NULL, "apply diffusion or pixel a second time", NULL, 0},
         {0}
@@ -276,6 +279,9 @@ int main(int argc, char **argv)
     if (g.from) {
         g.diffusion = opt_given(own, &c, "diffusion") ? g.diffusion : 0;
         foreign_otf(&g, &c, &bare);
+        double extent = bare.p ? psf_period(&bare) / 2 : psf_period(&bare);
+        if (!opt_given(own, &c, "size") && (double)g.size * g.scale > extent)
+            g.size = (long)fmax(1, floor(extent / g.scale));
     } else {
         choose_telescope(&g, own, &c);
         cells = telescope_otf(&g, &c, opt_given(own, &c, "pupil-grid"), &bare);

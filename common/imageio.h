@@ -95,6 +95,9 @@ MUST_CHECK int image_write(const struct image *im, const char *name, const char 
 struct table;
 /* First binary table of an open file (or the one the suffix selects). */
 MUST_CHECK int fits_in_table(struct fits_in *f, struct table *t, struct err *e);
+/* The array (of E or D) in the first row of a column of the binary table `index`; *v is allocated. */
+MUST_CHECK int fits_in_cell(struct fits_in *f, int index, const char *column, double **v, size_t *count,
+                            struct err *e);
 MUST_CHECK int fits_out_table(struct fits_out *f, const struct table *t, const char *extname,
                               struct err *e);
 

@@ -9,6 +9,7 @@
 #include "psf.h"
 #include "sky.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -191,13 +192,112 @@ static int read_samples(struct fits_in *f, const char *name, int index, const st
     return status;
 }
 
+/* A PSFEx model: samples as polynomials in position. */
+struct psfex {
+    long nx, ny, terms;        /* PSFAXIS1 to 3 */
+    long axes, degree;         /* POLNAXIS 0..2, POLDEG1 */
+    double zero[2], scale[2];  /* POLZEROi, POLSCALi */
+    double samp;               /* pixels per sample */
+};
+
+static int psfex_header(const char *name, const struct header *h, struct psfex *m, struct err *e)
+{
+    long groups = 0, naxis = 0;
+    *m = (struct psfex){.terms = 1, .scale = {1, 1}};
+    int bad = header_long(h, "PSFNAXIS", &naxis) || naxis < 2 || naxis > 3 || header_long(h, "PSFAXIS1", &m->nx) ||
+              header_long(h, "PSFAXIS2", &m->ny) || (naxis == 3 && header_long(h, "PSFAXIS3", &m->terms)) ||
+              header_double(h, "PSF_SAMP", &m->samp) || !(m->samp > 0) || header_long(h, "POLNAXIS", &m->axes) || m->axes < 0;
+    if (!bad && m->axes > 0)
+        bad = header_long(h, "POLNGRP", &groups) || header_long(h, "POLDEG1", &m->degree);
+    for (long i = 0; !bad && i < m->axes && i < 2; i++) {
+        char key[16];
+        snprintf(key, sizeof key, "POLZERO%ld", i + 1);
+        bad |= header_double(h, key, &m->zero[i]) != OK;
+        snprintf(key, sizeof key, "POLSCAL%ld", i + 1);
+        bad |= header_double(h, key, &m->scale[i]) != OK || m->scale[i] == 0;
+    }
+    if (bad)
+        return err_set(e, E_DATA, "%s: PSF_DATA lacks the keywords of a PSFEx model", name);
+    if (m->axes > 2 || groups > 1 || m->degree < 0 || m->degree > 20)
+        return err_set(e, E_DATA, "%s: PSFEx model in more than two variables, or in groups: fit it in X_IMAGE and Y_IMAGE", name);
+    long d = m->degree, terms = m->axes == 2 ? (d + 1) * (d + 2) / 2 : m->axes == 1 ? d + 1 : 1;
+    if (m->nx < 1 || m->ny < 1 || m->nx > 16385 || m->ny > 16385 || terms != m->terms)
+        return err_set(e, E_DATA, "%s: PSFEx model of %ld x %ld x %ld does not match its degree %ld", name, m->nx, m->ny, m->terms, d);
+    return OK;
+}
+
+/* v (nx ny terms) -> its first plane = sum of planes times x^i y^j, i fastest, i + j <= degree. */
+static void psfex_evaluate(const struct psfex *m, const struct psf_options *o, double *v)
+{
+    double x = (o->x - m->zero[0]) / m->scale[0], y = (o->y - m->zero[1]) / m->scale[1];
+    size_t count = (size_t)m->nx * (size_t)m->ny, plane = 0;
+    for (long j = 0; j <= (m->axes == 2 ? m->degree : 0); j++)
+        for (long i = 0; i <= m->degree - j; i++, plane++) {
+            double w = pow(x, (double)i) * pow(y, (double)j);
+            for (size_t k = 0; plane > 0 && k < count; k++)
+                v[k] += w * v[plane * count + k];
+        }
+}
+
+static int read_psfex(struct fits_in *f, const char *name, int index, const struct psf_options *o, struct otf *t,
+                      struct psf_info *info, struct err *e)
+{
+    struct header h = {0};
+    struct psfex m;
+    double *v = NULL, sum = 0;
+    size_t n = 0;
+    int status = fits_in_header(f, index, &h, e);
+    if (status == OK)
+        status = psfex_header(name, &h, &m, e);
+    if (status == OK && m.terms > 1 && !o->at)
+        status = err_set(e, E_DATA, "%s: the PSFEx model varies over its image: psfgen --from %s -X X -Y Y makes one PSF of it", name, name);
+    if (status == OK && !(o->scale > 0))
+        status = err_set(e, E_DATA, "%s: a PSFEx model does not tell the pixel scale of its image: give --psf-scale", name);
+    if (status == OK)
+        status = fits_in_cell(f, index, "PSF_MASK", &v, &n, e);
+    if (status == OK && n != (size_t)m.nx * (size_t)m.ny * (size_t)m.terms)
+        status = err_set(e, E_DATA, "%s: PSF_MASK has %zu values, not %ld x %ld x %ld", name, n, m.nx, m.ny, m.terms);
+    if (status == OK) {
+        psfex_evaluate(&m, o, v);
+        for (size_t i = 0; i < (size_t)m.nx * (size_t)m.ny; i++)
+            sum += v[i];
+        status = check_sum(name, sum, e);
+    }
+    if (status == OK) {
+        info->scale = o->scale * m.samp;
+        scale_flux((size_t)m.nx * (size_t)m.ny, v, sum, o, info);
+        double nyquist = 0.5 / info->scale, ucut = o->cutoff > 0 ? fmin(o->cutoff, nyquist) : nyquist;
+        status = otf_sample(t, (int)m.nx, (int)m.ny, v, info->scale, (double)(m.nx / 2), (double)(m.ny / 2), ucut);
+        if (status)
+            err_set(e, status, "%s: %s", name, err_text(status));
+        else
+            t->pixel = o->scale;
+    }
+    info->fwhm = NAN;
+    header_free(&h);
+    free(v);
+    return status;
+}
+
+/* HDU of a PSFEx model, or -1. */
+static int find_psfex(const struct fits_in *f)
+{
+    for (int i = 0; i < fits_in_count(f); i++)
+        if (!fits_in_hdu(f, i)->is_image && strcmp(fits_in_hdu(f, i)->extname, "PSF_DATA") == 0)
+            return i;
+    return -1;
+}
+
 /* Choose the HDU and read it. */
 static int read_open(struct fits_in *f, const char *name, const struct psf_options *o, struct otf *t, struct psf_info *info,
                      struct err *e)
 {
     int table = fits_in_find(f, "OTF", 0), index = fits_in_selected(f);
+    int model = find_psfex(f);
     if (table >= 0 && !has_suffix(name))
         index = table;
+    if (index < 0 && model >= 0)
+        return read_psfex(f, name, model, o, t, info, e);
     if (index < 0)
         return err_set(e, E_DATA, "%s: no image in it: a PSF is an image", name);
     struct header h = {0};

@@ -14,7 +14,9 @@
 
 /* What the user says about a PSF file; all zero means: what the file says. */
 struct psf_options {
-    double scale;          /* arcsec per sample, over the header's */
+    double scale;          /* arcsec per sample, over the header's; PSFEx: per pixel of its image */
+    int at;                /* x, y are given: position (FITS pixels) at which a PSFEx model is wanted */
+    double x, y;
     double cutoff;         /* transform is 0 beyond |u_x|,|u_y| = cutoff, cycles/arcsec */
     int has_pixel;         /* the pixel is in, whatever PIXRESP says */
     int normalise;         /* divide by the sum */
@@ -30,6 +32,9 @@ struct psf_info {
 };
 
 /*
+ * Also read: PSFEx models (binary table PSF_DATA), evaluated at one position of their image; the
+ * pixel is in them.
+ *
  * Read a PSF as a transfer function; "-" is standard input.  The extension OTF when there is
  * one and the name selects no HDU.  Otherwise the (selected) image: scale from
  * options, PIXELSCL, PIXSCALE, WCS; centre from CRPIX, else (N+1)/2; sum kept (and in info);

@@ -107,6 +107,33 @@ if [ -r "$SHARED/data/hdf/wfpc2_f814w_psf.fits" ]; then
 else
     skip "no WFPC2 PSF"
 fi
+# a PSFEx model of degree 1: planes g, .1 g, -.2 g with g a Gaussian of 2 samples, .4 pixel each
+if [ -n "$python" ]; then
+    "$python" - <<'END' 2>py.err
+import numpy as np
+from astropy.io import fits
+y, x = np.mgrid[:31, :31] - 15.
+g = np.exp(-(x * x + y * y) / 8) / (8 * np.pi)
+def write(name, planes, **more):
+    c = [fits.Column("FLAG", "J", array=[7]), fits.Column("PSF_MASK", "%dE" % planes.size, dim=str(planes.shape[::-1]), array=[planes.astype("f4")])]
+    t = fits.BinTableHDU.from_columns(c, name="PSF_DATA")
+    t.header.update(dict(POLNAXIS=2, POLGRP1=1, POLNAME1="X_IMAGE", POLZERO1=500., POLSCAL1=1000., POLGRP2=1, POLNAME2="Y_IMAGE", POLZERO2=300.,
+                         POLSCAL2=500., POLNGRP=1, POLDEG1=1, PSF_FWHM=2., PSF_SAMP=.4, PSFNAXIS=3, PSFAXIS1=31, PSFAXIS2=31, PSFAXIS3=len(planes)) | more)
+    fits.HDUList([fits.PrimaryHDU(), t]).writeto(name)
+write("model.psf", np.array([g, .1 * g, -.2 * g]))
+write("broken.psf", np.array([g, .1 * g, -.2 * g]), POLDEG1=2)
+END
+    ok "a PSFEx model" psfgen --from model.psf --psf-scale 0.1 -X 700 -Y 800 -o ex.fits
+    near "its flux at (700, 800): 1 + .1 * .2 - .2 * 1" "$(card ex.fits PSFFLUX)" 0.82 1e-6
+    near "its FWHM" "$(card ex.fits PSFFWHM)" 0.188386 2e-6
+    near "holds the pixel of its image" "$(card ex.fits PIXSIZE)" 0.1 1e-12
+    fails "a PSFEx model without a place" 1 psfgen --from model.psf --psf-scale 0.1 -o no.fits
+    fails "a PSFEx model without a pixel scale" 1 psfgen --from model.psf -X 1 -Y 1 -o no.fits
+    fails "a PSFEx model with another pixel" 1 psfgen --from model.psf --psf-scale 0.1 -X 1 -Y 1 --pixel 0.1 -o no.fits
+    fails "a PSFEx model that contradicts itself" 1 psfgen --from broken.psf --psf-scale 0.1 -X 1 -Y 1 -o no.fits
+    head -c 9000 model.psf >cut.psf
+    fails "a PSFEx model cut short" 1 psfgen --from cut.psf --psf-scale 0.1 -X 1 -Y 1 -o no.fits
+fi
 printf '%s\n' 'not a FITS file' >bad.fits
 fails "not FITS" 1 psfgen --from bad.fits -o no.fits
 fails "missing file" 1 psfgen --from none.fits -o no.fits
