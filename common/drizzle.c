@@ -3,6 +3,7 @@
  */
 #include "drizzle.h"
 #include "overlap.h"
+#include "simd.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -201,9 +202,11 @@ struct span {
     double head, body, tail;
 };
 
-static struct span span_of(double a, double b)
+/* Of a drop of the given half width; both are rounded, so all drops have one size. */
+static struct span span_of(double centre, double half_width)
 {
-    const double lo = fmin(a, b) + 0.5, hi = fmax(a, b) + 0.5, width = hi - lo;
+    const double c = rounded(centre) + 0.5, h = rounded(fabs(half_width));
+    const double lo = c - h, hi = c + h, width = hi - lo;
     struct span s = {.first = (long)floor(lo), .head = 1};
     s.last = s.first;
     if (width > SMALL) {
@@ -266,7 +269,7 @@ static void drop_aligned(struct job *j, const struct span *columns)
     const double half = 0.5 * j->pixfrac;
     for (long y = 0; y < in->ny; y++) {
         const double Y = (double)(in->y0 + y);
-        const struct span s = span_of(rounded(m->y0 + m->yy * (Y - half)), rounded(m->y0 + m->yy * (Y + half)));
+        const struct span s = span_of(m->y0 + m->yy * Y, half * m->yy);
         if (s.last < b->y0 || s.first >= b->y0 + b->ny)
             continue;
         const size_t row = (size_t)y * (size_t)in->nx;
@@ -295,8 +298,7 @@ static int rows_aligned(struct job *j)
     if (!columns)
         return E_NOMEM;
     for (long x = 0; x < j->in->nx; x++) {
-        const double X = (double)x;
-        columns[x] = span_of(rounded(m->x0 + m->xx * (X - half)), rounded(m->x0 + m->xx * (X + half)));
+        columns[x] = span_of(m->x0 + m->xx * (double)x, half * m->xx);
     }
     drop_aligned(j, columns);
     free(columns);
@@ -313,8 +315,8 @@ static void put_quad(struct job *j, const double X[4], const double Y[4], double
     if (!(x1 > 0 && y1 > (double)b->y0 && x0 < (double)b->nx && y0 < (double)(b->y0 + b->ny)))
         return;
     if (!(fabs(area) > SMALL * SMALL)) {
-        const struct span px = span_of(0.5 * (x0 + x1) - 0.5, 0.5 * (x0 + x1) - 0.5);
-        const struct span py = span_of(0.5 * (y0 + y1) - 0.5, 0.5 * (y0 + y1) - 0.5);
+        const struct span px = span_of(0.5 * (x0 + x1) - 0.5, 0);
+        const struct span py = span_of(0.5 * (y0 + y1) - 0.5, 0);
         put_box(j, &px, &py, d, w);
         return;
     }
@@ -335,14 +337,24 @@ static void put_quad(struct job *j, const double X[4], const double Y[4], double
     }
 }
 
+/* Any map: centre and corners are rounded apart where it is affine, so that all drops have one shape. */
 static void drop_square(struct job *j, double x, double y, double d, double w)
 {
     static const double side[4][2] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
-    double X[4], Y[4];
+    const struct drizzle_map *m = j->map;
+    double X[4], Y[4], cx = 0, cy = 0;
+    if (!m->node_x)
+        affine_at(m, x, y, &cx, &cy);
     for (int k = 0; k < 4; k++) {
-        drizzle_map_at(j->map, x + j->pixfrac * side[k][0], y + j->pixfrac * side[k][1], &X[k], &Y[k]);
-        X[k] = rounded(X[k]) + 0.5;
-        Y[k] = rounded(Y[k]) + 0.5;
+        const double u = j->pixfrac * side[k][0], v = j->pixfrac * side[k][1];
+        if (m->node_x) {
+            drizzle_map_at(m, x + u, y + v, &X[k], &Y[k]);
+        } else {
+            X[k] = m->xx * u + m->xy * v;
+            Y[k] = m->yx * u + m->yy * v;
+        }
+        X[k] = rounded(X[k]) + rounded(cx) + 0.5;
+        Y[k] = rounded(Y[k]) + rounded(cy) + 0.5;
     }
     put_quad(j, X, Y, d, w);
 }
@@ -353,10 +365,7 @@ static void drop_box(struct job *j, double x, double y, double d, double w)
     const double half = j->kernel == DRIZZLE_POINT ? 0 : 0.5 * j->pixfrac * j->map->scale;
     double X, Y;
     drizzle_map_at(j->map, x, y, &X, &Y);
-    X = rounded(X);
-    Y = rounded(Y);
-    const struct span sx = span_of(rounded(X - half), rounded(X + half));
-    const struct span sy = span_of(rounded(Y - half), rounded(Y + half));
+    const struct span sx = span_of(X, half), sy = span_of(Y, half);
     put_box(j, &sx, &sy, d, w);
 }
 
@@ -422,6 +431,157 @@ static void drop_smooth(struct job *j, double x, double y, double d, double w)
     }
 }
 
+/* ---- parallelograms: the square kernel of an affine map ---- */
+
+enum { WINDOW = 8, STRIDE = WINDOW + 2 };    /* cells; larger drops take put_quad */
+
+/* An edge of the drop from its lower to its upper end, relative to the drop's centre. */
+struct edge {
+    double ax, ay, bx, by;
+    double x_per_y, step;    /* dx/dy; |dy/dx| * rise */
+    double rise;             /* part of the drop to the right of 1 pixel of height */
+};
+
+struct shape {
+    struct edge edge[4];
+    int edges;               /* level ones are left out: nothing lies to their right */
+    double x[4], y[4];       /* corners, multiples of 2^-20 */
+    double x0, x1, y0, y1;
+};
+
+/* 0 when the shape has no area. */
+static int shape_make(struct shape *s, const struct drizzle_map *m, double pixfrac)
+{
+    static const double side[4][2] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
+    for (int k = 0; k < 4; k++) {
+        s->x[k] = rounded(pixfrac * (m->xx * side[k][0] + m->xy * side[k][1]));
+        s->y[k] = rounded(pixfrac * (m->yx * side[k][0] + m->yy * side[k][1]));
+    }
+    const double area = overlap_area(s->x, s->y);
+    s->x0 = fmin(fmin(s->x[0], s->x[1]), fmin(s->x[2], s->x[3]));
+    s->x1 = fmax(fmax(s->x[0], s->x[1]), fmax(s->x[2], s->x[3]));
+    s->y0 = fmin(fmin(s->y[0], s->y[1]), fmin(s->y[2], s->y[3]));
+    s->y1 = fmax(fmax(s->y[0], s->y[1]), fmax(s->y[2], s->y[3]));
+    s->edges = 0;
+    for (int k = 0; k < 4; k++) {
+        const int l = (k + 1) & 3, up = s->y[l] > s->y[k], lo = up ? k : l, hi = up ? l : k;
+        const double dx = s->x[hi] - s->x[lo], dy = s->y[hi] - s->y[lo];
+        if (!(dy > 0))
+            continue;
+        const double rise = (up ? -1 : 1) / area;
+        s->edge[s->edges++] = (struct edge){
+            .ax = s->x[lo], .ay = s->y[lo], .bx = s->x[hi], .by = s->y[hi],
+            .x_per_y = dx / dy, .rise = rise, .step = dx < 0 || dx > 0 ? rise * fabs(dy / dx) : 0,
+        };
+    }
+    return fabs(area) > SMALL * SMALL;
+}
+
+/* A piece of an edge inside one row of cells, from x = xa <= xb, with h to its right. */
+static inline void piece(double *sum, double xa, double xb, double h, double step)
+{
+    const int ia = (int)xa, ib = (int)xb;
+    if (ia == ib) {
+        const double m = h * (0.5 * (xa + xb) - ia);
+        sum[ia] += h - m;
+        sum[ia + 1] += m;
+        return;
+    }
+    const double first = ia + 1 - xa, last = xb - ib;
+    const double p = step * first, q = 0.5 * p * first;
+    sum[ia] += q;
+    sum[ia + 1] += p - q;
+    for (int i = ia + 1; i < ib; i++) {
+        sum[i] += 0.5 * step;
+        sum[i + 1] += 0.5 * step;
+    }
+    const double t = step * last, u = 0.5 * t * last;
+    sum[ib] += t - u;
+    sum[ib + 1] += u;
+}
+
+/* Adds the edges of a shape centred at (X, Y) of the window; as overlap_row, for all rows. */
+static inline void cover(const struct shape *s, double X, double Y, double *sum)
+{
+    for (int k = 0; k < s->edges; k++) {
+        const struct edge *e = &s->edge[k];
+        const double ax = X + e->ax, ay = Y + e->ay, by = Y + e->by;
+        double x = ax, y = ay;
+        int r = (int)ay;
+        for (;;) {
+            const int end = r + 1 >= by;
+            const double top = end ? by : r + 1, next = end ? X + e->bx : ax + (top - ay) * e->x_per_y;
+            const double h = e->rise * (top - y);
+            if (x < next)
+                piece(sum + r * STRIDE, x, next, h, e->step);
+            else
+                piece(sum + r * STRIDE, next, x, h, e->step);
+            if (end)
+                break;
+            x = next;
+            y = top;
+            r++;
+        }
+    }
+}
+
+static inline long below(double v)
+{
+    const long i = (long)v;
+    return i - (v < (double)i);
+}
+
+/* One drop at (X, Y), in cells. */
+static inline void drop_shape(struct job *j, const struct shape *s, double X, double Y, double d, double w)
+{
+    struct drizzle_band *b = j->band;
+    if (!(X + s->x1 > 0 && X + s->x0 < (double)b->nx && Y + s->y1 > (double)b->y0
+          && Y + s->y0 < (double)(b->y0 + b->ny)))
+        return;
+    const long i0 = below(X + s->x0), j0 = below(Y + s->y0);
+    const int nx = (int)(below(X + s->x1) - i0) + 1, ny = (int)(below(Y + s->y1) - j0) + 1;
+    double sum[WINDOW * STRIDE];
+    for (int i = 0; i < ny * STRIDE; i++)
+        sum[i] = 0;
+    cover(s, X - (double)i0, Y - (double)j0, sum);
+    const int c0 = i0 < 0 ? (int)-i0 : 0, c1 = i0 + nx > b->nx ? (int)(b->nx - i0) : nx;
+    const int r0 = j0 < b->y0 ? (int)(b->y0 - j0) : 0, r1 = j0 + ny > b->y0 + b->ny ? (int)(b->y0 + b->ny - j0) : ny;
+    b->split = 1;
+    for (int r = r0; r < r1; r++) {
+        const size_t at = (size_t)((j0 + r - b->y0) * b->nx + i0 + c0);
+        const double *line = sum + r * STRIDE;
+        double *flux = b->flux + at, *weight = b->weight + at;
+        double a = 0;
+        for (int c = 0; c < c0; c++)
+            a += line[c];
+        for (int c = c0; c < c1; c++) {
+            a += line[c];
+            if (a > LEAST) {
+                const double wa = w * a;
+                flux[c - c0] += wa * d;
+                weight[c - c0] += wa;
+                if (b->context)
+                    b->context[at + (size_t)(c - c0)] |= j->in->bit;
+            }
+        }
+    }
+}
+
+/* Pixels lo..hi of one row. */
+WIDE static void row_shapes(struct job *j, const struct shape *s, long y, long lo, long hi)
+{
+    const struct drizzle_map *m = j->map;
+    const struct drizzle_input *in = j->in;
+    const size_t row = (size_t)(y - in->y0) * (size_t)in->nx;
+    const double X0 = m->x0 + m->xy * (double)y, Y0 = m->y0 + m->yy * (double)y;
+    for (long x = lo; x <= hi; x++) {
+        const double w = weight_at(in, row + (size_t)x);
+        if (w > 0)
+            drop_shape(j, s, rounded(X0 + m->xx * (double)x) + 0.5, rounded(Y0 + m->yx * (double)x) + 0.5,
+                       in->scale * (double)in->pix[row + (size_t)x], w);
+    }
+}
+
 /* Part of [*lo, *hi] where c + m x lies in [a, b]. */
 static void narrow(double c, double m, double a, double b, double *lo, double *hi)
 {
@@ -443,6 +603,9 @@ static int rows_general(struct job *j)
     const struct drizzle_band *b = j->band;
     const double reach = drizzle_reach(j->kernel, j->pixfrac, m) + 1;
     const double low = (double)b->y0 - reach, high = (double)(b->y0 + b->ny) + reach;
+    struct shape shape = {.edges = 0};
+    const int shaped = j->kernel == DRIZZLE_SQUARE && !m->node_x && shape_make(&shape, m, j->pixfrac)
+        && shape.x1 - shape.x0 < WINDOW - 2 && shape.y1 - shape.y0 < WINDOW - 2;
     j->row = malloc(((size_t)b->nx + 2) * sizeof *j->row);
     if (!j->row)
         return E_NOMEM;
@@ -455,6 +618,10 @@ static int rows_general(struct job *j)
         }
         if (!(lo <= hi))
             continue;
+        if (shaped) {
+            row_shapes(j, &shape, in->y0 + y, (long)ceil(lo), (long)hi);
+            continue;
+        }
         const size_t row = (size_t)y * (size_t)in->nx;
         for (long x = (long)ceil(lo); x <= (long)hi; x++) {
             const double w = weight_at(in, row + (size_t)x);
@@ -493,8 +660,7 @@ int drizzle_rows(enum drizzle_kernel kernel, double pixfrac, const struct drizzl
 static int axis_splits(double x0, double xx, double half, long n)
 {
     for (long i = 0; i < n; i++) {
-        const double X = (double)i;
-        const struct span s = span_of(rounded(x0 + xx * (X - half)), rounded(x0 + xx * (X + half)));
+        const struct span s = span_of(x0 + xx * (double)i, half * xx);
         if (s.last > s.first)
             return 1;
     }

@@ -71,9 +71,12 @@ static void reference(const struct drizzle_map *m, double pf, const float *pix, 
             if (isnan(pix[j * NI + i]) || !(wht[j * NI + i] > 0))
                 continue;
             for (int k = 0; k < 4; k++) {
+                double ox = 0, oy = 0;               /* affine: centre and shape are rounded apart */
+                if (!m->node_x)
+                    drizzle_map_at(m, i, j, &ox, &oy);
                 drizzle_map_at(m, i + pf * side[k][0], j + pf * side[k][1], &X[k], &Y[k]);
-                X[k] = near20(X[k]) + 0.5;
-                Y[k] = near20(Y[k]) + 0.5;
+                X[k] = near20(ox) + near20(X[k] - ox) + 0.5;
+                Y[k] = near20(oy) + near20(Y[k] - oy) + 0.5;
             }
             for (int k = 0; k < 4; k++)
                 total += 0.5 * (X[k] * Y[(k + 1) & 3] - X[(k + 1) & 3] * Y[k]);
