@@ -2,13 +2,14 @@
 #include "render.h"
 #include "fft.h"
 #include "par.h"
+#include "simd.h"
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define BATCH_PIXELS 262144    /* doubles held by one batch of stamps: 2 MiB */
 #define CHUNK 4                /* objects a thread takes at a time */
-#define TALL 320               /* rows; taller stamps, always few, are added to the image itself */
+#define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
 
 int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
 {
@@ -85,15 +86,25 @@ struct window {
     long next;                     /* first row not yet written to the image */
 };
 
+WIDE static void add_doubles(long n, const double *restrict from, double *restrict to)
+{
+    for (long i = 0; i < n; i++)
+        to[i] += from[i];
+}
+
+WIDE static void add_floats(long n, const double *restrict from, float *restrict to)
+{
+    for (long i = 0; i < n; i++)
+        to[i] = (float)(to[i] + from[i]);
+}
+
 /* Add rows below `end` to the image and clear them. */
 static void window_move(struct window *w, long end)
 {
     const size_t nx = (size_t)w->im->nx;
     for (; w->next < end; w->next++) {
         double *from = w->row + (size_t)(w->next % w->height) * nx;
-        float *to = w->im->pix + (size_t)w->next * nx;
-        for (size_t i = 0; i < nx; i++)
-            to[i] = (float)(to[i] + from[i]);
+        add_floats((long)nx, from, w->im->pix + (size_t)w->next * nx);
         memset(from, 0, nx * sizeof *from);
     }
 }
@@ -106,8 +117,7 @@ static void image_add(struct image *im, const struct draw *d, const double *stam
     for (long y = y0; y < y1; y++) {
         float *to = im->pix + (size_t)y * (size_t)im->nx;
         const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx;
-        for (long x = x0; x < x1; x++)
-            to[x] = (float)(to[x] + from[x - d->x0]);
+        add_floats(x1 - x0, from + (x0 - d->x0), to + x0);
     }
 }
 
@@ -120,8 +130,7 @@ static void window_add(struct window *w, const struct draw *d, const double *sta
     for (long y = y0; y < y1; y++) {
         double *to = w->row + (size_t)(y % w->height) * (size_t)nx;
         const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx;
-        for (long x = x0; x < x1; x++)
-            to[x] += from[x - d->x0];
+        add_doubles(x1 - x0, from + (x0 - d->x0), to + x0);
     }
 }
 
