@@ -111,7 +111,7 @@ static void check_options(const struct psfgen *g, const struct opt *own, const s
 {
     static const char *const tel[] = {"telescope", "diameter", "wavelength", "bandwidth", "wavelengths", "obscuration",
                                       "obscuration-offset", "struts", "strut-width", "strut-angle", "zernike", "pupil-grid"};
-    static const char *const file[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "x", "y", "normalise", "force"};
+    static const char *const file[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "x-image", "y-image", "normalise", "force"};
     for (size_t i = 0; g->from && i < sizeof tel / sizeof *tel; i++)
         if (opt_given(own, c, tel[i]))
             die(EXIT_USAGE, "option --%s: a PSF from a file has no telescope: leave out this or --from", tel[i]);
@@ -266,8 +266,8 @@ int main(int argc, char **argv)
         {"psf-scale", 0, OPT_REAL, &g.from_scale, 1e-6, 1e3, "ARCSEC", "its sampling, over its header's", NULL, 0},
         {"psf-cutoff", 0, OPT_REAL, &g.cutoff, 1e-6, 1e6, "U", "its highest frequency, cycles/arcsec", NULL, 0},
         {"psf-has-pixel", 0, OPT_FLAG, &g.has_pixel, 0, 0, NULL, "its pixel is in, whatever PIXRESP says", NULL, 0},
-        {"x", 'X', OPT_REAL, &g.x, -1e6, 1e6, "X", "where a PSFEx model is evaluated, FITS pixels", NULL, 0},
-        {"y", 'Y', OPT_REAL, &g.y, -1e6, 1e6, "Y", "where a PSFEx model is evaluated, FITS pixels", NULL, 0},
+        {"x-image", 'X', OPT_REAL, &g.x, -1e6, 1e6, "X", "where a PSFEx model is evaluated, FITS pixels", NULL, 0},
+        {"y-image", 'Y', OPT_REAL, &g.y, -1e6, 1e6, "Y", "where a PSFEx model is evaluated, FITS pixels", NULL, 0},
         {"normalise", 0, OPT_FLAG, &g.normalise, 0, 0, NULL, "divide it by its flux", NULL, 0},
         {"force", 0, OPT_FLAG, &g.force, 0, 0, NULL, "apply diffusion or pixel a second time", NULL, 0},
         {0}
