@@ -30,6 +30,7 @@ ALL_L    = $(LDFLAGS) $(SAN) $(PKG_L) -lm -pthread
 PROGRAMS := $(patsubst cmd/%.c,%,$(wildcard cmd/*.c))
 COMMON   := $(patsubst common/%.c,$(BUILD)/common/%.o,$(wildcard common/*.c))
 UNIT     := $(patsubst tests/unit/%.c,$(BUILD)/unit/%,$(wildcard tests/unit/*.c))
+TOOLS    := $(patsubst tests/tool/%.c,$(BUILD)/tool/%,$(wildcard tests/tool/*.c))
 MAN      := $(wildcard man/*.[17])
 
 all: $(PROGRAMS:%=$(BIN)/%)    # build every program
@@ -66,14 +67,18 @@ endif
 layers:    # check that common/ has an order and that only imageio knows cfitsio
 	@tests/layers
 
+$(BUILD)/tool/%: $(BUILD)/tests/tool/%.o $(BUILD)/libcommon.a
+	@mkdir -p $(@D)
+	$(CC) -o $@ $< $(BUILD)/libcommon.a $(ALL_L)
+
 $(BUILD)/fault.so: tests/fault.c $(BUILD)/flags
 	$(CC) -D_GNU_SOURCE -O1 -fPIC -shared -o $@ $< -ldl
 
-check: all $(UNIT) $(BUILD)/fault.so    # run every test
-	tests/run $(UNIT) $(sort $(wildcard tests/cmd/*.sh tests/peer/*.sh))
+check: all $(UNIT) $(TOOLS) $(BUILD)/fault.so    # run every test
+	BIN=$(BIN) BUILD=$(BUILD) tests/run $(UNIT) $(sort $(wildcard tests/cmd/*.sh tests/peer/*.sh))
 
-check-large: all $(UNIT)    # tests that need time or memory
-	tests/run $(sort $(wildcard tests/large/*.sh))
+check-large: all $(UNIT) $(TOOLS)    # tests that need time or memory
+	BIN=$(BIN) BUILD=$(BUILD) tests/run $(sort $(wildcard tests/large/*.sh))
 
 sanitize:    # the tests again under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(MAKE) check BUILD=build/sanitize BIN=build/sanitize/bin CFLAGS='-O1 -g' \

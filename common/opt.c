@@ -386,7 +386,7 @@ static void print_default(const struct opt *o)
 static void help_line(const struct opt *o)
 {
     char left[80];
-    const char *arg = o->type == OPT_CHOICE && !o->arg ? o->choices : o->arg;
+    const char *arg = o->type == OPT_CHOICE ? o->choices : o->arg;
     if (o->letter)
         snprintf(left, sizeof left, "-%c --%s%s%s", o->letter, o->name, arg ? " " : "", arg ? arg : "");
     else

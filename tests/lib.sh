@@ -1,10 +1,10 @@
 # lib.sh - sourced by tests/cmd/*.sh and tests/peer/*.sh.
 # Every check prints one line: "ok - ...", "not ok - ..." or "skip - ...".
-# The runner sets BIN (programs), TOP (project) and SHARED (reference data, may
-# be missing) and starts each script in an empty directory of its own.
+# The runner sets BIN (programs), BUILD (objects, tools), TOP (project) and SHARED
+# (reference data, may be missing) and starts each script in an empty directory of its own.
 LC_ALL=C
 export LC_ALL
-PATH=$BIN:$PATH
+PATH=$BIN:$BUILD/tool:$PATH
 failures=0
 
 pass() { echo "ok - $*"; }

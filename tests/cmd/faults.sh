@@ -1,8 +1,7 @@
 # Every program, with the n-th allocation, write, read, sync, rename, link, open
 # or close failing: it fails cleanly (status 1, one line, no output, nothing
 # left behind) or succeeds with the same bytes.
-so=$(dirname "$BIN")/build/fault.so
-for so in "$TOP/build/fault.so" "$BIN/../fault.so"; do [ -f "$so" ] && break; done
+so=$BUILD/fault.so
 if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then skip "a sanitizer's build cannot preload a fault library"; exit 0; fi
 [ -f "$so" ] || { fail "no $so"; exit 1; }
 
