@@ -13,6 +13,7 @@ struct wing {
 struct grid {
     long mx, my;
     int32_t *head, *next;                  /* chains of blobs by the cell of their centroid */
+    double *centre;                        /* x, y of every blob */
 };
 
 static struct wing wing_of(const struct blob *b, double beta)
@@ -41,17 +42,15 @@ static int grid_new(struct grid *g, const struct blob_list *list, long nx, long 
     size_t cells = (size_t)g->mx * (size_t)g->my;
     g->head = malloc(cells * sizeof *g->head);
     g->next = malloc((list->n + 1) * sizeof *g->next);
-    if (!g->head || !g->next) {
-        free(g->head);
-        free(g->next);
+    g->centre = malloc((2 * list->n + 1) * sizeof *g->centre);
+    if (!g->head || !g->next || !g->centre)
         return E_NOMEM;
-    }
     for (size_t i = 0; i < cells; i++)
         g->head[i] = -1;
     for (size_t i = list->n; i-- > 0;) {
-        const struct blob *b = &list->blob[i];
-        long x = (long)(b->sx / b->s + b->x0), y = (long)(b->sy / b->s + b->y0);
-        long cell = y / CELL * g->mx + x / CELL;
+        double *c = &g->centre[2 * i], xx, xy, yy;
+        blob_moments(&list->blob[i], &c[0], &c[1], &xx, &xy, &yy);
+        long cell = (long)c[1] / CELL * g->mx + (long)c[0] / CELL;
         g->next[i] = g->head[cell];
         g->head[cell] = (int32_t)i;
     }
@@ -76,7 +75,7 @@ static void claim(const struct blob_list *list, size_t i, double beta, const str
                 const struct blob *o = &list->blob[j];
                 if ((size_t)j == i || !(o->s < b->s || (!(o->s > b->s) && (size_t)j > i)))
                     continue;
-                double dx = o->sx / o->s + o->x0 - w.x, dy = o->sy / o->s + o->y0 - w.y;
+                double dx = g->centre[2 * j] - w.x, dy = g->centre[2 * j + 1] - w.y;
                 if (!(dx * dx + dy * dy < reach * reach))
                     continue;
                 double r2 = w.cxx * dx * dx + w.cyy * dy * dy + w.cxy * dx * dy;
@@ -93,15 +92,13 @@ int clean_objects(struct blob_list *list, double beta, long nx, long ny, int32_t
     if (!(beta >= 0.1 && beta <= 10))
         return E_RANGE;
     size_t n = list->n;
-    struct grid g;
+    struct grid g = {0};
     double *light = calloc(n + 1, sizeof *light);
     if (!light)
         return E_NOMEM;
     int st = grid_new(&g, list, nx, ny);
-    if (st) {
-        free(light);
-        return st;
-    }
+    if (st)
+        goto done;
     for (size_t i = 0; i < n; i++)
         into[i] = (int32_t)i;
     for (size_t i = 0; i < n; i++)
@@ -118,9 +115,11 @@ int clean_objects(struct blob_list *list, double beta, long nx, long ny, int32_t
     }
     for (size_t i = 0; i < n; i++)
         if (into[i] != (int32_t)i)
-            blob_merge(&list->blob[into[i]], &list->blob[i]);
+            blob_absorb(&list->blob[into[i]], &list->blob[i]);
+done:
     free(g.head);
     free(g.next);
+    free(g.centre);
     free(light);
-    return OK;
+    return st;
 }

@@ -21,6 +21,7 @@ struct pixel {
     int32_t next;          /* chain of a connected set */
     int32_t set;           /* peak it grew from; later its object */
     uint16_t level;
+    uint16_t core;         /* 1: belongs to a branch, not shared */
 };
 
 struct peak {
@@ -325,7 +326,7 @@ static int flood(struct deblend_work *w, const struct deblend_params *p, double 
             if (w->peak[set].seen == (int32_t)k)
                 continue;
             w->peak[set].seen = (int32_t)k;
-            st = close_set(w, set, above, p->contrast * total, p->min_area);
+            st = close_set(w, set, above, p->contrast * total, p->branch_area);
         }
     }
     if (st)
@@ -375,7 +376,7 @@ static double log_profile(const struct part *t, const struct pixel *p)
     return t->log_peak - 0.5 * (t->cxx * dx * dx + t->cyy * dy * dy + 2 * t->cxy * dx * dy);
 }
 
-enum { FREE = -1, QUEUED = -2 };
+enum { FREE = -1, QUEUED = -2, SHARERS = 64 };
 
 /* The object of a free pixel: the brightest of its labelled neighbours' objects, FREE if none. */
 static int32_t best_part(const struct deblend_work *w, int32_t i)
@@ -407,8 +408,10 @@ static int share_pixels(struct deblend_work *w, int32_t first, long levels)
     for (int32_t t = first; t >= 0; t = w->part[t].next) {
         fit_part(w, &w->part[t]);
         int32_t i = w->part[t].head;
-        for (int32_t k = 0; k < w->part[t].n; k++, i = w->pixel[i].next)
+        for (int32_t k = 0; k < w->part[t].n; k++, i = w->pixel[i].next) {
             w->pixel[i].set = t;
+            w->pixel[i].core = 1;
+        }
     }
     const int32_t *end = w->order + w->npixel;
     for (long k = 0; k < levels; k++) {
@@ -436,17 +439,21 @@ static int share_pixels(struct deblend_work *w, int32_t first, long levels)
 
 /* ---- sums ---- */
 
-static void blob_add(struct blob *b, int32_t x, int32_t y, double f, double v)
+static void add_moments(struct blob *b, int32_t x, int32_t y, double f)
 {
     double dx = x - b->x0, dy = y - b->y0;
-    b->n++;
-    b->above += v > b->threshold;
     b->s += f;
     b->sx += f * dx;
     b->sy += f * dy;
     b->sxx += f * dx * dx;
     b->sxy += f * dx * dy;
     b->syy += f * dy * dy;
+}
+
+static void add_pixel_to(struct blob *b, int32_t x, int32_t y, double f, double v)
+{
+    b->n++;
+    b->above += v > b->threshold;
     b->flux += v;
     if (v > b->peak) {
         b->peak = v;
@@ -460,15 +467,8 @@ static void blob_add(struct blob *b, int32_t x, int32_t y, double f, double v)
     b->ymax = y > b->ymax ? y : b->ymax;
 }
 
-void blob_merge(struct blob *a, const struct blob *b)
+void blob_absorb(struct blob *a, const struct blob *b)
 {
-    double dx = b->x0 - a->x0, dy = b->y0 - a->y0;
-    a->sxx += b->sxx + 2 * dx * b->sx + dx * dx * b->s;
-    a->syy += b->syy + 2 * dy * b->sy + dy * dy * b->s;
-    a->sxy += b->sxy + dx * b->sy + dy * b->sx + dx * dy * b->s;
-    a->sx += b->sx + dx * b->s;
-    a->sy += b->sy + dy * b->s;
-    a->s += b->s;
     a->n += b->n;
     a->above += b->above;
     a->flux += b->flux;
@@ -477,22 +477,24 @@ void blob_merge(struct blob *a, const struct blob *b)
         a->xpeak = b->xpeak;
         a->ypeak = b->ypeak;
     }
-    a->smooth_peak = b->smooth_peak > a->smooth_peak ? b->smooth_peak : a->smooth_peak;
     a->xmin = b->xmin < a->xmin ? b->xmin : a->xmin;
     a->xmax = b->xmax > a->xmax ? b->xmax : a->xmax;
     a->ymin = b->ymin < a->ymin ? b->ymin : a->ymin;
     a->ymax = b->ymax > a->ymax ? b->ymax : a->ymax;
-    a->flags |= b->flags;
 }
 
 void blob_moments(const struct blob *b, double *x, double *y, double *xx, double *xy, double *yy)
 {
-    double mx = b->sx / b->s, my = b->sy / b->s;
-    *x = mx + b->x0;
-    *y = my + b->y0;
-    *xx = b->sxx / b->s - mx * mx;
-    *yy = b->syy / b->s - my * my;
-    *xy = b->sxy / b->s - mx * my;
+    double mx = b->sx / b->s, my = b->sy / b->s, dx = 0, dy = 0;
+    if (b->flags & DETECT_BLENDED) {
+        dx = b->core_x - mx;
+        dy = b->core_y - my;
+    }
+    *x = mx + dx + b->x0;
+    *y = my + dy + b->y0;
+    *xx = b->sxx / b->s - mx * mx + dx * dx;
+    *yy = b->syy / b->s - my * my + dy * dy;
+    *xy = b->sxy / b->s - mx * my + dx * dy;
     if (!(*xx * *yy - *xy * *xy >= 1 / 144.0)) {
         *xx = (*xx > 0 ? *xx : 0) + 1 / 12.0;
         *yy = (*yy > 0 ? *yy : 0) + 1 / 12.0;
@@ -575,6 +577,29 @@ static double component_threshold(const struct deblend_work *w, const struct deb
     return low;
 }
 
+/*
+ * Moments of a pixel outside the cores: its light is divided among all parts of
+ * the component as their Gaussians divide it there (with more than SHARERS
+ * parts it all goes to the part that owns it).
+ */
+static void share_moments(const struct deblend_work *w, int32_t first, const struct pixel *p, struct blob *blob,
+                          size_t parts)
+{
+    double light[SHARERS], most = -INFINITY, sum = 0;
+    size_t k = 0;
+    for (int32_t t = first; t >= 0; t = w->part[t].next, k++) {
+        light[k] = log_profile(&w->part[t], p);
+        most = light[k] > most ? light[k] : most;
+    }
+    for (k = 0; k < parts; k++) {
+        light[k] = light[k] > most - 10 ? exp(light[k] - most) : 0;
+        sum += light[k];
+    }
+    for (k = 0; k < parts; k++)
+        if (light[k] > 0)
+            add_moments(&blob[k], p->x, p->y, (double)p->v * light[k] / sum);
+}
+
 /* Sums of the labelled pixels; objects are numbered in the order of their parts. */
 static int measure(const struct segments *s, size_t c, const struct deblend_params *p,
                    struct deblend_work *w, double threshold, int32_t first, int32_t *owner,
@@ -592,21 +617,32 @@ static int measure(const struct segments *s, size_t c, const struct deblend_para
     int st = grow(&out->blob, &out->cap, base + parts, sizeof *out->blob);
     if (st)
         return st;
-    for (size_t k = 0; k < parts; k++)
-        out->blob[base + k] = (struct blob){.xmin = INT32_MAX, .ymin = INT32_MAX, .xmax = -1, .ymax = -1,
+    for (size_t j = 0; j < parts; j++)
+        out->blob[base + j] = (struct blob){.xmin = INT32_MAX, .ymin = INT32_MAX, .xmax = -1, .ymax = -1,
                                             .flags = parts > 1 ? DETECT_BLENDED : 0,
                                             .peak = -INFINITY, .threshold = threshold};
+    size_t k = 0;
+    for (int32_t t = first; t >= 0; t = w->part[t].next, k++) {
+        out->blob[base + k].x0 = (int32_t)w->part[t].x;
+        out->blob[base + k].y0 = (int32_t)w->part[t].y;
+        out->blob[base + k].core_x = w->part[t].x - out->blob[base + k].x0;
+        out->blob[base + k].core_y = w->part[t].y - out->blob[base + k].y0;
+    }
+    if (first < 0) {
+        out->blob[base].x0 = w->pixel[0].x;
+        out->blob[base].y0 = w->pixel[0].y;
+    }
     int32_t i = 0;
     for (size_t r = s->first[c]; r < s->first[c + 1]; r++)
         for (int32_t x = s->run[r].x0; x < s->run[r].x1; x++, i++) {
             size_t at = s->run[r].at + (size_t)(x - s->run[r].x0);
             w->pixel[i].set = first >= 0 ? w->queue[w->pixel[i].set] : 0;
             struct blob *b = &out->blob[base + (size_t)w->pixel[i].set];
-            if (b->n == 0) {
-                b->x0 = x;
-                b->y0 = s->run[r].y;
-            }
-            blob_add(b, x, s->run[r].y, (double)s->smooth[at], (double)s->value[at]);
+            add_pixel_to(b, x, s->run[r].y, (double)s->smooth[at], (double)s->value[at]);
+            if (parts > 1 && parts <= SHARERS && !w->pixel[i].core)
+                share_moments(w, first, &w->pixel[i], out->blob + base, parts);
+            else
+                add_moments(b, x, s->run[r].y, (double)s->smooth[at]);
             owner[at] = (int32_t)base + w->pixel[i].set;
         }
     out->n = base + parts;
@@ -623,7 +659,7 @@ int deblend_component(const struct segments *s, size_t c, const struct deblend_p
         return st;
     double threshold = component_threshold(w, p);
     int32_t first = -1;
-    if (p->levels > 1 && p->contrast < 1 && w->npixel > 2 * p->min_area) {
+    if (p->levels > 1 && p->contrast < 1 && w->npixel > 2 * p->branch_area) {
         link_rows(w);
         if (has_two_maxima(w)) {
             st = flood(w, p, threshold, &first);

@@ -7,7 +7,8 @@
  * least min_area pixels and more than `contrast` of the component's flux above
  * that level, they are objects of their own.  Pixels outside the branches go,
  * from bright to faint and outwards from labelled neighbours, to the neighbour
- * object whose Gaussian profile is brightest there.
+ * object whose Gaussian profile is brightest there; in the moments their light is
+ * divided among the objects in the ratio of the profiles.
  *
  * All levels come from one flood from the peak downwards with union-find, so
  * time is linear in the pixels of the component (times 8 neighbours).
@@ -28,10 +29,11 @@ struct blob {
     long n;                    /* pixels */
     long above;                /* of them, unfiltered value above the threshold */
     double s, sx, sy, sxx, sxy, syy;   /* of filtered values f: sum f, f x, ... */
+    double core_x, core_y;     /* blended: centroid of the branch's pixels, relative to (x0, y0) */
     double flux;               /* sum of unfiltered values */
     double peak, smooth_peak;
     double threshold;          /* filtered level of the isophote */
-    double margin;             /* the min_area-th brightest pixel's excess over it */
+    double margin;             /* the min_area-th brightest filtered pixel's excess over it */
 };
 
 enum { DETECT_BLENDED = 2 };
@@ -44,7 +46,8 @@ struct blob_list {
 struct deblend_params {
     long levels;               /* 2..1024; 1 or contrast 1: no deblending */
     double contrast;           /* 0..1 */
-    long min_area;             /* pixels */
+    long min_area;             /* pixels of an object, for blob.margin */
+    long branch_area;          /* least pixels of a branch */
     double threshold;          /* filtered level everywhere; ignored with rms_map */
     const float *rms_map;      /* or NULL; then threshold is in units of it */
     long nx;                   /* of the image, for rms_map */
@@ -61,11 +64,13 @@ void deblend_work_free(struct deblend_work *w);
 MUST_CHECK int deblend_component(const struct segments *s, size_t c, const struct deblend_params *p,
                                  struct deblend_work *w, int32_t *owner, struct blob_list *out);
 
-/* a += b, as if the pixels of b had been a's. */
-void blob_merge(struct blob *a, const struct blob *b);
+/* a takes the pixels and the flux of b, but keeps its own position and shape. */
+void blob_absorb(struct blob *a, const struct blob *b);
 
 /*
- * Centroid (pixels from 0) and second moments (pixel^2) of filtered values.
+ * Centroid (pixels from 0) and second moments (pixel^2) of filtered values;
+ * for a deblended object the centroid of its branch, which neighbours disturb
+ * less, and moments of all its pixels about that.
  * Where the moments are singular (determinant below 1/144), 1/12 is added to
  * both axes.
  */

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { BRANCH = 3 };            /* least pixels of a deblended branch */
 enum { COMPONENTS = 256, OBJECTS = 64, RUNS = 4096 };      /* per task */
 
 void detect_weights(float *map, size_t n, enum weight_type type)
@@ -217,6 +218,7 @@ static int separate(const struct image *im, const float *map, const struct detec
     long tasks = (long)((s->ncomponent + COMPONENTS - 1) / COMPONENTS);
     struct deblend_params dp = {
         .levels = p->levels, .contrast = p->contrast, .min_area = p->min_area, .rms_map = map,
+        .branch_area = p->min_area < BRANCH ? p->min_area : BRANCH,
         .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx
     };
     struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)),
