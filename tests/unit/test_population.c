@@ -341,8 +341,46 @@ static void test_sizes(void)
     check_end(&ka);
 }
 
+/* The scale is the best of seven, 0.25 to 0.95 of the smoothed half-light radius. */
+static void test_scale(void)
+{
+    struct population p = POPULATION_DEFAULTS;
+    struct profiles f = population_profiles();
+    struct rng r = rng_stream(11, 0, RNG_GALAXY);
+    struct check grid = check_begin("steps of the scale are whole, 0..6"), best = check_begin("no step captures more power");
+    long used[7] = {0};
+    for (uint64_t i = 0; i < 500; i++) {
+        double mag = 22 + 0.014 * (double)i, c[COUNT], most = 0;
+        struct galaxy g;
+        struct gaussians s;
+        struct galaxy_fit fit;
+        galaxy_draw(&p, &r, i, mag, &g);
+        int n = galaxy_order(mag);
+        if (galaxy_gaussians(&p, &f, &g, &s) || galaxy_project(&p, &g, &s, n, c, &fit))
+            break;
+        double size = sqrt(g.re * g.re + 2 * log(2) * 0.03 * 0.03), step = (fit.beta / size - 0.25) / 0.7 * 6;
+        check_close(&grid, step, fmin(6, fmax(0, rint(step))), 1e-9);
+        for (int k = 0; k < 7; k++) {
+            double sum = 0;
+            if (gaussians_project(&s, n, size * (0.25 + 0.7 * k / 6), c))
+                break;
+            for (int j = 0; j < (n + 1) * (n + 2) / 2; j++)
+                sum += c[j] * c[j];
+            most = fmax(most, sum);
+        }
+        check_close(&best, fit.power, most / gaussians_power(&s), 1e-12);
+        used[(int)fmin(6, fmax(0, rint(step)))]++;
+    }
+    check_that(grid.n == 500 && best.n == 500, "500 galaxies");
+    check_end(&grid);
+    check_end(&best);
+    check_that(used[0] + used[1] > 5 && used[3] > 50 && used[6] > 10, "steps taken: %ld %ld %ld %ld %ld %ld %ld", used[0], used[1], used[2],
+               used[3], used[4], used[5], used[6]);
+}
+
 int main(void)
 {
+    test_scale();
     test_rendered();
     test_quadrature();
     test_moments();
