@@ -135,10 +135,10 @@ int stats_line(size_t n, const double *x, const double *y, const double *s, stru
     return OK;
 }
 
-void stats_resample(size_t n, uint64_t seed, uint64_t draw, uint32_t *index)
+void stats_resample(size_t n, size_t m, uint64_t seed, uint64_t draw, uint32_t *index)
 {
     struct rng r = rng_stream(seed, 0, RNG_BOOTSTRAP);
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < m; i++) {
         size_t k = (size_t)(rng_uniform(&r, draw, (uint32_t)i) * (double)n);
         index[i] = (uint32_t)(k < n ? k : n - 1);
     }
@@ -164,7 +164,7 @@ static double bootstrap(size_t n, const double *a, const double *b, long draws, 
     long used = 0;
     for (long k = 0; k < draws; k++) {
         double sa = 0, sb = 0;
-        stats_resample(n, seed, (uint64_t)k, index);
+        stats_resample(n, n, seed, (uint64_t)k, index);
         for (size_t i = 0; i < n; i++) {
             sa += a[index[i]];
             sb += b ? b[index[i]] : 1;

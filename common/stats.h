@@ -66,9 +66,9 @@ struct ratio {
 MUST_CHECK int stats_ratio(size_t n, const double *a, const double *b, long draws, uint64_t seed, struct ratio *out);
 
 /*
- * index[i] of resampling `draw`: n numbers in 0..n-1 with replacement; the same
- * for the same seed, whatever was drawn before.
+ * index[i], i < m, of resampling `draw`: numbers in 0..n-1 with replacement; the
+ * same for the same seed, whatever was drawn before.  n > 0.
  */
-void stats_resample(size_t n, uint64_t seed, uint64_t draw, uint32_t *index);
+void stats_resample(size_t n, size_t m, uint64_t seed, uint64_t draw, uint32_t *index);
 
 #endif

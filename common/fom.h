@@ -1,0 +1,71 @@
+/*
+ * fom.h - figures of merit of a survey from its shape catalogues: number
+ * density, bias of the shear, spread of the shear, and what they make of the
+ * power spectrum's error.
+ *
+ * A group is all images of one set and one CCD pixel scale: nine shears of one
+ * or more fields.  Shear estimate: e/G with one G, the mean of (P11 + P22)/2
+ * over all used objects of the group.  What cannot be had from so few objects
+ * is NaN, which programs write as "undefined".
+ */
+#ifndef PIXSHEAR_FOM_H
+#define PIXSHEAR_FOM_H
+
+#include "err.h"
+#include "fomcat.h"
+#include "table.h"
+#include <stddef.h>
+#include <stdint.h>
+
+struct fom_options {
+    double radius;            /* largest distance of common objects, arcsec */
+    int median;               /* median instead of mean in G */
+    int fit_line;             /* correct sigma with the slopes of the fits even where pairs give better ones */
+    long draws;               /* bootstrap resamplings */
+    uint64_t seed;
+    const char *ref_set;      /* Delta C_l is normalised to this set and scale */
+    double ref_scale;
+};
+
+/* Columns of the result after SETNAME CCDSCALE NIMAGES NFIELDS; fom_column[] describes them. */
+enum fom_quantity {
+    FOM_N_DET, FOM_N_STARCUT, FOM_N_ELLCUT, FOM_N_SIZECUT, FOM_N_SNRCUT, FOM_N_GAL, FOM_N_GALERR, FOM_N_EFF,
+    FOM_G, FOM_SIGMA_E,
+    FOM_B1, FOM_B1SE, FOM_A1, FOM_A1SE, FOM_CHI1, FOM_B2, FOM_B2SE, FOM_A2, FOM_A2SE, FOM_CHI2, FOM_DOF,
+    FOM_SIGMA1, FOM_SIGMA2, FOM_SIGMA, FOM_SIGMAERR, FOM_STDERR, FOM_STDERRERR,
+    FOM_SKEW1, FOM_SKEW1ERR, FOM_KURT1, FOM_KURT1ERR, FOM_SKEW2, FOM_SKEW2ERR, FOM_KURT2, FOM_KURT2ERR,
+    FOM_PAIRS1, FOM_BP1, FOM_BP1SE, FOM_BP1JK, FOM_BP1BS, FOM_BT1, FOM_BT1SE, FOM_CP1, FOM_CP1SE,
+    FOM_PAIRS2, FOM_BP2, FOM_BP2SE, FOM_BP2JK, FOM_BP2BS, FOM_BT2, FOM_BT2SE, FOM_CP2, FOM_CP2SE,
+    FOM_SEL1, FOM_SEL1SE, FOM_TOT1, FOM_TOT1SE, FOM_SEL2, FOM_SEL2SE, FOM_TOT2, FOM_TOT2SE,
+    FOM_L1, FOM_L1A, FOM_L1ASE, FOM_L1B, FOM_L1BSE, FOM_L2, FOM_L2A, FOM_L2ASE, FOM_L2B, FOM_L2BSE,
+    FOM_LOGDC, FOM_LOGDCERR,
+    FOM_QUANTITIES
+};
+
+struct fom_text {
+    const char *name, *unit, *what;
+};
+extern const struct fom_text fom_column[FOM_QUANTITIES];
+
+struct fom_result {
+    char set[64];
+    double scale;             /* CCDSCALE, arcsec */
+    double area;              /* of one image, arcmin^2 */
+    long images, fields;
+    double v[FOM_QUANTITIES];
+};
+
+/* Everything one group can tell by itself. Images all of one set and scale. */
+MUST_CHECK int fom_group(size_t n, const struct fom_image *const *im, const struct fom_options *o, struct fom_result *r);
+
+/*
+ * Lines b = a + slope * CCDSCALE through the slopes of each set (three scales
+ * or more; else their mean), sigma divided by them, Delta C_l = sigma^2/(theta
+ * n) against the reference.
+ */
+MUST_CHECK int fom_compare(size_t n, struct fom_result *r, const struct fom_options *o);
+
+/* The results as a catalogue, one row per group. */
+MUST_CHECK int fom_to_table(size_t n, const struct fom_result *r, struct table *t);
+
+#endif

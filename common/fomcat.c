@@ -1,0 +1,164 @@
+/* fomcat.c - what the figures of merit need of a shape catalogue; common objects. */
+#include "fomcat.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+void fom_image_free(struct fom_image *im)
+{
+    free(im->object);
+    *im = (struct fom_image){0};
+}
+
+static void copy_word(char to[64], const char *from, const char *otherwise)
+{
+    snprintf(to, 64, "%s", from && *from ? from : otherwise);
+}
+
+static int read_keywords(struct fom_image *im, const struct table *t, struct err *e)
+{
+    static const char *const count[5] = {"NDET", "NSTARCUT", "NELLCUT", "NSIZECUT", "NSNRCUT"};
+    copy_word(im->set, table_text(t, "SETNAME"), "-");
+    copy_word(im->field, table_text(t, "FIELDID") ? table_text(t, "FIELDID") : table_text(t, "SEED"), "-");
+    for (int k = 0; k < 2; k++)
+        if (table_key_number(t, k ? "SHEAR2" : "SHEAR1", &im->g[k]) != OK)
+            return err_set(e, E_MISSING, "no keyword SHEAR%d: shapes must be measured on an image that has it", k + 1);
+    if (table_key_number(t, "CCDSCALE", &im->scale) != OK && table_key_number(t, "PIXSCALE", &im->scale) != OK)
+        return err_set(e, E_MISSING, "no keyword CCDSCALE or PIXSCALE");
+    im->area = NAN;
+    double v;
+    if (table_key_number(t, "AREA", &v) == OK && v > 0)
+        im->area = v;
+    for (int k = 0; k < 5; k++) {
+        im->count[k] = NAN;
+        if (table_key_number(t, count[k], &v) == OK)
+            im->count[k] = v;
+    }
+    return OK;
+}
+
+int fom_image_read(struct fom_image *im, const struct table *t, struct err *e)
+{
+    static const char *const need[] = {"E1", "E2", "E1ERR", "E2ERR", "P11", "P22"};
+    const struct column *c[6];
+    struct fom_image r = {.n = t->nrow};
+    for (int k = 0; k < 6; k++) {
+        c[k] = table_find(t, need[k]);
+        if (!c[k])
+            return err_set(e, E_MISSING, "no column %s: measure shapes with rrgshape first", need[k]);
+    }
+    int st = read_keywords(&r, t, e);
+    if (st)
+        return st;
+    const struct column *ra = table_find(t, "ALPHA_J2000"), *dec = table_find(t, "DELTA_J2000"), *cut = table_find(t, "CUT");
+    const struct column *x = table_find(t, "X_IMAGE"), *y = table_find(t, "Y_IMAGE");
+    r.sky = ra && dec;
+    if (!r.sky && !(x && y))
+        return err_set(e, E_MISSING, "no positions: columns ALPHA_J2000 DELTA_J2000 or X_IMAGE Y_IMAGE");
+    double px = 1;
+    if (!r.sky && table_key_number(t, "PIXSCALE", &px) != OK)
+        return err_set(e, E_MISSING, "no keyword PIXSCALE and no sky positions");
+    r.marked = cut != NULL;
+    r.object = calloc(t->nrow + 1, sizeof *r.object);
+    if (!r.object)
+        return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
+    for (size_t i = 0; i < t->nrow; i++) {
+        struct fom_object *o = &r.object[i];
+        *o = (struct fom_object){
+            .x = r.sky ? table_number(ra, i) : table_number(x, i) * px,
+            .y = r.sky ? table_number(dec, i) : table_number(y, i) * px,
+            .e = {table_number(c[0], i), table_number(c[1], i)}, .err = {table_number(c[2], i), table_number(c[3], i)},
+            .p = {table_number(c[4], i), table_number(c[5], i)}};
+        int good = isfinite(o->e[0]) && isfinite(o->e[1]) && isfinite(o->p[0]) && isfinite(o->p[1]);
+        o->measured = good && hypot(o->e[0], o->e[1]) < 2;
+        o->used = good && (!cut || table_number(cut, i) == 0);
+    }
+    *im = r;
+    return OK;
+}
+
+size_t fom_image_used(const struct fom_image *im)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < im->n; i++)
+        n += (size_t)im->object[i].used;
+    return n;
+}
+
+struct place {
+    double x, y;
+    size_t i;
+};
+
+static int by_y(const void *a, const void *b)
+{
+    const struct place *p = a, *q = b;
+    return p->y < q->y ? -1 : p->y > q->y ? 1 : p->i < q->i ? -1 : p->i > q->i;
+}
+
+/* Positions in arcsec about the origin (sky: flat, cos of the origin's declination), sorted by y. */
+static size_t sorted(struct place *p, const struct fom_image *im, const double origin[2])
+{
+    size_t m = 0;
+    double scale = cos(origin[1] * M_PI / 180) * 3600;
+    for (size_t i = 0; i < im->n; i++) {
+        const struct fom_object *o = &im->object[i];
+        if (!isfinite(o->x) || !isfinite(o->y))
+            continue;
+        p[m] = (struct place){o->x, o->y, i};
+        if (im->sky)
+            p[m] = (struct place){remainder(o->x - origin[0], 360) * scale, (o->y - origin[1]) * 3600, i};
+        m++;
+    }
+    qsort(p, m, sizeof *p, by_y);
+    return m;
+}
+
+/* near[i] of every object of a: nearest of b within radius, -1 when there is none; both sorted by y. */
+static void nearest(size_t na, const struct place *a, size_t nb, const struct place *b, double radius, long *near)
+{
+    size_t first = 0;
+    for (size_t k = 0; k < na; k++) {
+        double best = radius * radius;
+        near[a[k].i] = -1;
+        while (first < nb && b[first].y < a[k].y - radius)
+            first++;
+        for (size_t j = first; j < nb && b[j].y <= a[k].y + radius; j++) {
+            double dx = b[j].x - a[k].x, dy = b[j].y - a[k].y, d = dx * dx + dy * dy;
+            if (d < best || (d <= best && near[a[k].i] < 0)) {
+                best = d;
+                near[a[k].i] = (long)b[j].i;
+            }
+        }
+    }
+}
+
+int fom_match(const struct fom_image *a, const struct fom_image *b, double radius, long *to)
+{
+    struct place *p = malloc((a->n + 1) * sizeof *p), *q = malloc((b->n + 1) * sizeof *q);
+    long *back = malloc((b->n + 1) * sizeof *back);
+    int st = p && q && back ? OK : E_NOMEM;
+    if (st == OK) {
+        double origin[2] = {0, 0};
+        for (size_t i = a->n; a->sky && i-- > 0;)
+            if (isfinite(a->object[i].x) && isfinite(a->object[i].y)) {
+                origin[0] = a->object[i].x;
+                origin[1] = a->object[i].y;
+            }
+        for (size_t i = 0; i < a->n; i++)
+            to[i] = -1;
+        for (size_t j = 0; j < b->n; j++)
+            back[j] = -1;
+        size_t na = sorted(p, a, origin), nb = sorted(q, b, origin);
+        nearest(na, p, nb, q, radius, to);
+        nearest(nb, q, na, p, radius, back);
+        for (size_t i = 0; i < a->n; i++)
+            if (to[i] >= 0 && back[to[i]] != (long)i)
+                to[i] = -1;
+    }
+    free(p);
+    free(q);
+    free(back);
+    return st;
+}

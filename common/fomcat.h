@@ -1,0 +1,45 @@
+/*
+ * fomcat.h - what the figures of merit need of a shape catalogue, and which
+ * objects two catalogues have in common.
+ */
+#ifndef PIXSHEAR_FOMCAT_H
+#define PIXSHEAR_FOMCAT_H
+
+#include "err.h"
+#include "table.h"
+#include <stddef.h>
+
+struct fom_object {
+    double x, y;              /* sky: right ascension and declination, deg; else arcsec */
+    double e[2], err[2];
+    double p[2];              /* P11, P22 */
+    int used;                 /* passes the cuts and has an ellipticity */
+    int measured;             /* has an ellipticity below 2 */
+};
+
+struct fom_image {
+    char set[64], field[64];  /* SETNAME; FIELDID or SEED: images of one field show the same galaxies */
+    double scale;             /* CCDSCALE, arcsec */
+    double g[2];              /* SHEAR1, SHEAR2 */
+    double area;              /* arcmin^2; NaN: unknown */
+    double count[5];          /* left after: detection, stars, ellipticity, size, S/N; NaN: unknown */
+    int marked;               /* has a column CUT: rows that fail are there too */
+    int sky;                  /* positions are on the sky */
+    size_t n;
+    struct fom_object *object;
+};
+
+/* What fom needs of one catalogue. E_MISSING: e names the column or keyword. Free with fom_image_free. */
+MUST_CHECK int fom_image_read(struct fom_image *im, const struct table *t, struct err *e);
+void fom_image_free(struct fom_image *im);
+
+/* Number of used objects. */
+size_t fom_image_used(const struct fom_image *im);
+
+/*
+ * Mutual nearest neighbours: to[i] is the object of b that is nearest to object
+ * i of a and whose nearest in a is i, not farther than radius (arcsec); -1: none.
+ */
+MUST_CHECK int fom_match(const struct fom_image *a, const struct fom_image *b, double radius, long *to);
+
+#endif

@@ -1,0 +1,65 @@
+# fom: catalogues whose answers are known; groups, pairs, undefined values.
+
+# shapes NAME SET SCALE G1 G2 SLOPE N SEED: N galaxies with P = 1.25 and e = e0 + 1.25 SLOPE g, same e0 for one seed
+shapes() {
+    awk -v set="$2" -v scale="$3" -v g1="$4" -v g2="$5" -v slope="$6" -v n="$7" -v seed="$8" 'BEGIN { srand(seed)
+        printf "# Keyword: SETNAME = %s\n# Keyword: CCDSCALE = %s\n# Keyword: PIXSCALE = %s\n# Keyword: SHEAR1 = %s\n# Keyword: SHEAR2 = %s\n", set, scale, scale, g1, g2
+        printf "# Keyword: AREA = 4\n# Keyword: SEED = %d\n# Keyword: NDET = %d\n", seed, 2 * n
+        print "# NUMBER X_IMAGE Y_IMAGE E1 E2 E1ERR E2ERR P11 P22 CUT"
+        for (i = 1; i <= n; i++) { a = rand(); b = rand(); if (a == 0) a = 0.5; r = 0.25 * sqrt(-2 * log(a))
+            printf "%d %.3f %.3f %.9f %.9f 0.05 0.05 1.25 1.25 0\n", i, 30 * (i % 40), 30 * int(i / 40), r * cos(6.2831853 * b) + 1.25 * slope * g1, r * sin(6.2831853 * b) + 1.25 * slope * g2 } }' >"$1"
+}
+nine() { # PREFIX SET SCALE SLOPE N SEED
+    local k=0 g
+    for g in "0 0" "-0.05 0" "-0.025 0" "0.025 0" "0.05 0" "0 -0.05" "0 -0.025" "0 0.025" "0 0.05"; do
+        set -- "$1" "$2" "$3" "$4" "$5" "$6" $g
+        shapes "$1$k" "$2" "$3" "$7" "$8" "$4" "$5" "$6"; k=$((k + 1))
+    done
+}
+nine a sim1 0.10 0.95 400 1; nine b sim1 0.06 0.97 400 2; nine c sim1 0.14 0.93 300 3; nine d sim2 0.10 0.9 400 4
+ok "one group" fom a? -o one.cat
+near "one row" "$(grep -vc '^#' one.cat)" 1 0
+near "images" "$(col one.cat NIMAGES)" 9 0
+near "n_gal" "$(col one.cat N_GAL)" 100 1e-9
+near "detected" "$(col one.cat N_DET)" 200 1e-9
+near "G" "$(col one.cat G)" 1.25 1e-9
+near "slope by pairs" "$(col one.cat BPAIR1)" 0.95 1e-6
+near "slope by pairs, component 2" "$(col one.cat BPAIR2)" 0.95 1e-6
+near "slope of the fit within 5 of its errors" "$(paste <(col one.cat B1) <(col one.cat B1SE) | awk '{ d = ($1 - 0.95) / $2; print (d < 5 && d > -5) }')" 1 0
+near "SE of the fit, 12.65 sigma/sqrt(n)" "$(paste <(col one.cat B1SE) <(col one.cat SIGMA1) | awk '{ print $1 / $2 * 20 }')" 12.649 0.001
+near "sigma of a 2-D normal of 0.25, over G and the slope" "$(col one.cat SIGMA_GAMMA)" 0.298 0.02
+near "common objects" "$(col one.cat NPAIR1)" 400 0
+ok "four groups" fom a? b? c? d? --reference-set sim1 --reference-scale 0.10 -o all.cat
+near "rows sorted by set and scale" "$(paste <(col all.cat SETNAME) <(col all.cat CCDSCALE) | sort -c -k1,1 -k2,2g && echo 1)" 1 0
+near "reference has log10 dC = 0" "$(col all.cat LOGDC | sed -n 2p)" 0 1e-12
+near "line over three scales" "$(col all.cat LINE1A | head -1)" 1 1e-4
+near "its change with scale" "$(col all.cat LINE1B | head -1)" -0.5 1e-3
+near "sim2 has no line: its own slope" "$(col all.cat LINE1 | tail -1)" 0.9 1e-6
+fom a? b? c? d? --reference-set sim1 -j 2 -o again.cat; near "order and threads: same numbers" "$(diff <(grep -v '^#' all.cat) <(grep -v '^#' again.cat) | wc -l)" 0 0
+fom d? c? b? a? --reference-set sim1 --reference-scale 0.10 -o back.cat; near "operands in another order: same rows" "$(diff <(grep -v '^#' all.cat) <(grep -v '^#' back.cat) | wc -l)" 0 0
+ok "table for people" fom a? b? --table -o table.txt
+near "table has a line a group and one above" "$(wc -l <table.txt)" 3 0
+
+# selection: galaxies with e1 > 0.1 fail, in every image by its own e1: response -r (u + r), r = phi/Phi at u = .1/.25
+nine s sel 0.10 1 4000 7
+for k in 0 1 2 3 4 5 6 7 8; do awk '/^#/ { print; next } { $10 = $4 > 0.1 ? 2 : 0; print }' s$k >t$k; done
+ok "own selection in each image" fom t? --draws 0 --reference-set sel -o sel.cat
+near "selection bias" "$(col sel.cat MSEL1)" -0.5284 "$(awk -v s="$(col sel.cat MSEL1SE)" 'BEGIN { print 4 * s + 0.002 }')"
+near "measurement bias: none" "$(col sel.cat BPAIR1)" 1 1e-6
+near "total = measurement + selection" "$(paste <(col sel.cat MTOT1) <(col sel.cat MSEL1) | awk '{ print $1 - $2 }')" 0 0.03
+
+# undefined, exit 0, a warning
+shapes few0 few 0.10 0 0 1 3 9; shapes few1 few 0.10 0.05 0 1 3 9
+ok "three galaxies" fom few0 few1 -o few.cat
+grep -q undefined cmd.err && pass "three galaxies: warning says undefined" || fail "no warning: $(cat cmd.err)"
+near "three galaxies: G is nan" "$(col few.cat G | grep -c nan)" 1 0
+grep '^#' few0 >none0; ok "no survivor" fom none0 -o none.cat
+near "no survivor: n_gal 0" "$(col none.cat N_GAL)" 0 0
+fom few0 few1 --table -q >few.txt; grep -q undefined few.txt && pass "undefined in the table" || fail "no undefined in $(cat few.txt)"
+sed 's/ 0.05 / nan /' a4 >nan4; ok "rows without an error" fom a0 nan4 -o nan.cat
+fails "no operand" 2 fom
+fails "no such file" 1 fom a0 nothere
+grep -v SHEAR1 a0 >nog; fails "no SHEAR1" 1 fom nog
+sed 's/ P11 / P99 /' a0 >nop; fails "no response column" 1 fom nop
+head -c 4000 a0 >cut; sed -i '$ s/ [^ ]*$//; $ s/ [^ ]*$//' cut; fails "truncated catalogue" 1 fom cut
+fails "output is an input" 1 fom a0 -o a0

@@ -1,0 +1,233 @@
+/* test_fom.c - common objects, slopes, selection, lines over scales, on catalogues whose answers are known. */
+#include "check.h"
+#include "fom.h"
+#include "fompair.h"
+#include "rng.h"
+#include <stdlib.h>
+#include <string.h>
+
+static const double shears[9][2] = {{0, 0}, {-.05, 0}, {-.025, 0}, {.025, 0}, {.05, 0}, {0, -.05}, {0, -.025}, {0, .025}, {0, .05}};
+
+struct world {
+    size_t n;                 /* galaxies of a field */
+    double m;                 /* bias put in */
+    double sigma, noise;      /* intrinsic and measurement spread of e */
+    double limit;             /* galaxies with e1 above are not used; 0: all are */
+    uint64_t seed;
+};
+
+/* Galaxy i with response P, intrinsic e0; the noise is the same under every shear. */
+static struct fom_image image(const struct world *w, const double g[2], double scale, const char *field, uint64_t key)
+{
+    struct rng r = rng_stream(w->seed, (uint32_t)key, RNG_TEST);
+    struct fom_image im = {.scale = scale, .g = {g[0], g[1]}, .area = 4, .count = {900, 890, 880, 870, 860}, .marked = 1, .n = w->n};
+    snprintf(im.set, sizeof im.set, "sim");
+    snprintf(im.field, sizeof im.field, "%s", field);
+    im.object = calloc(w->n + 1, sizeof *im.object);
+    for (size_t i = 0; i < w->n; i++) {
+        struct fom_object *o = &im.object[i];
+        double response = 1.3 + 0.2 * rng_normal(&r, i, 0);
+        o->x = 2 * (double)(i % 100) + 0.3 * rng_uniform(&r, i, 1) + 0.2 * g[0];
+        o->y = 2 * (double)(i / 100) + 0.3 * rng_uniform(&r, i, 2);
+        for (int c = 0; c < 2; c++) {
+            o->e[c] = w->sigma * rng_normal(&r, i, 3 + (uint32_t)c) + w->noise * rng_normal(&r, i, 5 + (uint32_t)c) +
+                      response * (1 + w->m) * g[c];
+            o->err[c] = w->noise;
+            o->p[c] = response;
+        }
+        o->measured = 1;
+        o->used = w->limit == 0 || o->e[0] < w->limit;
+    }
+    return im;
+}
+
+static const struct fom_options standard = {.radius = 0.15, .draws = 50, .seed = 1, .ref_scale = 0.1, .ref_set = "sim"};
+
+/* All nine shears of `fields` fields. */
+static struct fom_result measure(const struct world *w, double scale, int fields, const struct fom_options *o)
+{
+    struct fom_image im[27];
+    const struct fom_image *p[27];
+    struct fom_result r = {{0}, 0, 0, 0, 0, {0}};
+    size_t n = 0;
+    for (int f = 0; f < fields; f++)
+        for (int k = 0; k < 9; k++, n++) {
+            char name[8];
+            snprintf(name, sizeof name, "f%d", f);
+            im[n] = image(w, shears[k], scale, name, (uint64_t)f);
+            p[n] = &im[n];
+        }
+    int st = fom_group(n, p, o, &r);
+    if (st)
+        check_that(0, "fom_group: status %d", st);
+    for (size_t i = 0; i < n; i++)
+        fom_image_free(&im[i]);
+    return r;
+}
+
+static void matching(void)
+{
+    enum { N = 400 };
+    struct fom_object a[N] = {{0}}, b[N] = {{0}};
+    struct rng r = rng_stream(51, 0, RNG_TEST);
+    for (uint32_t i = 0; i < N; i++) {
+        a[i] = (struct fom_object){.x = 3 * rng_uniform(&r, i, 0), .y = 3 * rng_uniform(&r, i, 1)};
+        b[i] = (struct fom_object){.x = 3 * rng_uniform(&r, i, 2), .y = 3 * rng_uniform(&r, i, 3)};
+    }
+    a[7].x = NAN;
+    struct fom_image ia = {.n = N, .object = a}, ib = {.n = N, .object = b};
+    long to[N];
+    struct check c = check_begin("mutual nearest neighbours = brute force, 400 x 400 crowded");
+    check_close(&c, fom_match(&ia, &ib, 0.15, to), OK, 0.1);
+    for (int i = 0; i < N; i++) {
+        long best = -1, back = -1;
+        double d = 0.15 * 0.15, d2;
+        for (int j = 0; j < N; j++)
+            if ((d2 = pow(a[i].x - b[j].x, 2) + pow(a[i].y - b[j].y, 2)) <= d) {
+                d = d2;
+                best = j;
+            }
+        d = INFINITY;
+        for (int j = 0; j < N && best >= 0; j++)
+            if ((d2 = pow(a[j].x - b[best].x, 2) + pow(a[j].y - b[best].y, 2)) < d) {
+                d = d2;
+                back = j;
+            }
+        check_close(&c, (double)to[i], (double)(back == i ? best : -1), 0.1);
+    }
+    check_end(&c);
+    /* the sky: 0.1" apart across RA 0, at declination 60 */
+    struct fom_object p = {.x = 359.9999999, .y = 60}, q = {.x = 0.0000400, .y = 60};
+    struct fom_image ip = {.n = 1, .object = &p, .sky = 1}, iq = {.n = 1, .object = &q, .sky = 1};
+    c = check_begin("the sky: 0.072 arcsec across RA = 0 at declination 60");
+    check_close(&c, fom_match(&ip, &iq, 0.0730, to), OK, 0.1);
+    check_close(&c, (double)to[0], 0, 0.1);
+    check_close(&c, fom_match(&ip, &iq, 0.0715, to), OK, 0.1);
+    check_close(&c, (double)to[0], -1, 0.1);
+    check_end(&c);
+}
+
+static void slopes(void)
+{
+    struct world w = {.n = 3000, .m = 0.07, .sigma = 0.25, .noise = 0.1, .seed = 52};
+    struct fom_result r = measure(&w, 0.1, 1, &standard);
+    const double *v = r.v;
+    struct check c = check_begin("one field: what was put in comes out");
+    check_close(&c, v[FOM_G], 1.3, 5 * 0.2 / sqrt(3000));
+    check_close(&c, v[FOM_N_GAL], 750, 1e-9);
+    check_close(&c, v[FOM_N_GALERR], 0, 1e-9);
+    check_close(&c, v[FOM_N_DET], 225, 1e-9);
+    check_close(&c, v[FOM_SIGMA_E], sqrt(2) * hypot(0.25, 0.1), 0.01);
+    check_close(&c, v[FOM_N_EFF], 750 * 0.0625 / 0.0725, 12);
+    check_close(&c, v[FOM_PAIRS1], 3000, 0.1);
+    /* r_i = (1+m) P_i exactly, so the ratio has no error left */
+    check_close(&c, v[FOM_BP1], 1.07, 1e-12);
+    check_close(&c, v[FOM_BP2], 1.07, 1e-12);
+    check_close(&c, v[FOM_BT1], 1.07, 1e-12);
+    check_close(&c, v[FOM_BP1SE], 0, 1e-12);
+    check_close(&c, v[FOM_B1], 1.07, 5 * v[FOM_B1SE]);
+    check_close(&c, v[FOM_A1], 0, 5 * v[FOM_A1SE]);
+    check_close(&c, v[FOM_DOF], 7, 0.1);
+    check_close(&c, v[FOM_TOT1], 0.07, 1e-12);
+    check_close(&c, v[FOM_SEL1], 0, 1e-12);
+    check_close(&c, v[FOM_B1SE], 12.649 * v[FOM_SIGMA1] / sqrt(3000), 1e-4);
+    check_end(&c);
+}
+
+/* Errors against the scatter over 120 worlds, with a selection on e1 whose response has a closed form. */
+static void selection(void)
+{
+    enum { M = 120 };
+    struct fom_options o = standard;
+    o.draws = 0;
+    double s[4] = {0}, q[4] = {0}, se[4] = {0};
+    const double sigma = 0.25, t = 0.2;
+    for (int k = 0; k < M; k++) {
+        struct world w = {.n = 3000, .m = 0, .sigma = sigma, .noise = 0, .limit = t, .seed = 900 + (uint64_t)k};
+        struct fom_result r = measure(&w, 0.1, 1, &o);
+        double x[4] = {r.v[FOM_SEL1], r.v[FOM_TOT1], r.v[FOM_BP1], r.v[FOM_CP1]};
+        double err[4] = {r.v[FOM_SEL1SE], r.v[FOM_TOT1SE], r.v[FOM_BP1SE], r.v[FOM_CP1SE]};
+        for (int i = 0; i < 4; i++) {
+            s[i] += x[i] / M;
+            q[i] += x[i] * x[i] / M;
+            se[i] += err[i] / M;
+        }
+    }
+    /* <e0 | e0 < t - a g> = -sigma phi(u)/Phi(u), u = (t - a g)/sigma; derivative in g, over G = a */
+    double u = t / sigma, phi = exp(-u * u / 2) / sqrt(2 * M_PI), cap = 0.5 * erfc(-u / sqrt(2)), ratio = phi / cap;
+    double want = -ratio * (u + ratio);
+    struct check c = check_begin("selection on e1: its response = closed form, total = measurement + selection, measurement unbiased");
+    double mean_err = sqrt((q[0] - s[0] * s[0]) / M);
+    check_close(&c, s[0], want, 5 * mean_err + 2e-3);
+    check_close(&c, s[1], want, 5 * sqrt((q[1] - s[1] * s[1]) / M) + 2e-3);
+    check_close(&c, s[2], 1, 1e-9);
+    check_end(&c);
+    printf("# selection %.4f (want %.4f), total m %.4f\n", s[0], want, s[1]);
+    c = check_begin("their standard errors against the scatter of 120 worlds (known to 6.5 %; 4 sigma)");
+    for (int i = 0; i < 2; i++)
+        check_close(&c, se[i] / sqrt(q[i] - s[i] * s[i]), 1, 0.26);
+    check_end(&c);
+}
+
+static void fields_and_lines(void)
+{
+    struct world w = {.n = 1000, .m = 0, .sigma = 0.25, .noise = 0.1, .seed = 53};
+    struct fom_result two = measure(&w, 0.1, 2, &standard);
+    struct check c = check_begin("two fields: both are used, none is mixed up");
+    check_close(&c, (double)two.fields, 2, 0.1);
+    check_close(&c, (double)two.images, 18, 0.1);
+    check_close(&c, two.v[FOM_PAIRS1], 2000, 0.1);
+    check_close(&c, two.v[FOM_BP1], 1, 1e-12);
+    check_close(&c, two.v[FOM_DOF], 16, 0.1);
+    check_end(&c);
+
+    struct fom_result r[5];
+    for (int i = 0; i < 5; i++) {
+        double scale = 0.06 + 0.02 * i;
+        w.m = -0.2 - 0.5 * scale;
+        r[i] = measure(&w, scale, 1, &standard);
+        r[i].v[FOM_BP1SE] = r[i].v[FOM_BP2SE] = 0.01;      /* exact here: any error will do */
+    }
+    c = check_begin("line over five scales, sigma and Delta C_l by its formula");
+    check_close(&c, fom_compare(5, r, &standard), OK, 0.1);
+    for (int i = 0; i < 5; i++) {
+        const double *v = r[i].v;
+        check_close(&c, v[FOM_L1A], 0.8, 1e-9);
+        check_close(&c, v[FOM_L1B], -0.5, 1e-8);
+        check_close(&c, v[FOM_L2], 0.8 - 0.5 * r[i].scale, 1e-9);
+        double s = hypot(v[FOM_SIGMA1] / v[FOM_L1], v[FOM_SIGMA2] / v[FOM_L2]);
+        check_close(&c, v[FOM_SIGMA], s, 1e-12);
+        double ref = pow(r[2].v[FOM_SIGMA], 2) / r[2].v[FOM_N_GAL] / 0.1;
+        check_close(&c, v[FOM_LOGDC], log10(s * s / v[FOM_N_GAL] / r[i].scale / ref), 1e-12);
+    }
+    check_close(&c, r[2].v[FOM_LOGDC], 0, 1e-15);
+    check_end(&c);
+}
+
+static void undefined(void)
+{
+    struct world w = {.n = 3, .sigma = 0.25, .seed = 54};
+    struct fom_result r = measure(&w, 0.1, 1, &standard);
+    check_that(isnan(r.v[FOM_G]) && isnan(r.v[FOM_B1]) && isnan(r.v[FOM_BP1]) && isfinite(r.v[FOM_N_GAL]), "27 measurements: no response, no slopes, a density");
+    w.n = 0;
+    r = measure(&w, 0.1, 1, &standard);
+    check_that(r.v[FOM_N_GAL] == 0 && isnan(r.v[FOM_SIGMA1]) && isnan(r.v[FOM_KURT1]), "no survivor: density 0, the rest undefined");
+    check_that(fom_compare(1, &r, &standard) == OK && isnan(r.v[FOM_LOGDC]), "no survivor: no power spectrum error");
+    w = (struct world){.n = 500, .sigma = 0, .seed = 55};
+    r = measure(&w, 0.1, 1, &standard);
+    check_that(isfinite(r.v[FOM_G]) && isfinite(r.v[FOM_BP1]) && isfinite(r.v[FOM_B1]), "no intrinsic ellipticity: slopes are defined");
+    struct fom_image im = image(&w, shears[0], 0.1, "f", 0);
+    const struct fom_image *one[2] = {&im, &im};
+    check_that(fom_group(2, one, &standard, &r) == OK && isnan(r.v[FOM_B1]) && isnan(r.v[FOM_BP1]), "all-equal shears: no slope");
+    fom_image_free(&im);
+}
+
+int main(void)
+{
+    matching();
+    slopes();
+    selection();
+    fields_and_lines();
+    undefined();
+    return check_status();
+}
