@@ -179,6 +179,31 @@ static void test_pixel_random(void)
         }
 }
 
+/* Far outside the turning point nothing cancels, so the integrals keep their relative accuracy. */
+static void test_pixel_tails(void)
+{
+    static double b[61];
+    static long double want[61];
+    unsigned long s = 3;
+    for (int k = 0; k < 8; k++) {
+        const double h = (double[]){1e-4, 1e-2, 0.09, 0.1, 0.3, 0.99, 1.5, 4}[k];
+        char name[100];
+        snprintf(name, sizeof name, "pixel integrals: relative in the tails to 36, h = %g / 5e-14", h);
+        struct check c = check_begin(name);
+        for (int i = 0; i < 150; i++) {
+            const double at = 36 * (2 * uniform(&s) - 1);
+            const double edge[2] = {at - 0.5 * h, at + 0.5 * h};
+            if (shapelet_pixel(60, 1, 1, edge, b))
+                check_that(0, "pixel refuses");
+            pixel_long(60, edge[0], edge[1], want);
+            for (int n = 0; n <= 60; n++)
+                if (fabs(at) - 0.5 * h > sqrt(2 * n + 1) + 1 && fabs(at) < sqrt(2 * n + 1) + 11)
+                    check_close(&c, (double)(b[n] / want[n]), 1, 5e-14);
+        }
+        check_end(&c);
+    }
+}
+
 static void test_pixel_identities(void)
 {
     struct check c = check_begin("pixel integrals: mixed widths add up to the line, beta 0.3, order 40");
@@ -512,6 +537,7 @@ int main(void)
     test_basis_random();
     test_basis_scale();
     test_pixel_random();
+    test_pixel_tails();
     test_pixel_identities();
     test_sums();
     test_fourier();
