@@ -9,6 +9,19 @@
  * Coefficient order: n rising, inside n by rising n1:
  * (0,0) (0,1) (1,0) (0,2) (1,1) (2,0) ...; (n1,n2) is at n(n+1)/2 + n1, n = n1+n2.
  * x and beta in one unit u; B_n in u^(-1/2).  No allocation unless stated.
+ *
+ * Measured: worst error at random points against long double, and time of 64 points, pixels,
+ * or 64 x 64 pixels on one AVX-512 core (without wide vectors about 3 times longer):
+ *   function      orders  worst error                      order 12   order 60
+ *   basis         <= 200  3.8e-15                          0.24 us    0.74 us
+ *   pixel         <= 60   1.7e-14 min(h, 2/sqrt(2n+1))     1.2 us     3 us
+ *                 <= 200  2.9e-14 of the same, at h = 0.05
+ *                 <= 60   1.4e-14 of itself in the tails
+ *   pixel_sum     <= 60   2e-16 of peak                    2.0 us     11 us
+ *   rotate_by     <= 66   4e-16, 7e-16 there and back      1.2 us     28 us
+ *   rotate        <= 66   the same bits                    2.9 us     80 us
+ *   polar         <= 60   6e-17
+ * A rounding of x / beta adds |x phi'| 1e-16 for beta other than a power of 2.
  */
 #ifndef PIXSHEAR_SHAPELET_H
 #define PIXSHEAR_SHAPELET_H
@@ -24,7 +37,7 @@ size_t shapelet_index(int n1, int n2);
 
 /*
  * b[n*m + i] = B_n(x[i]; beta), n = 0..nmax, i = 0..m-1.  Upward recurrence
- * with the half-Gaussian start: absolute error <= 1e-14 for n <= 200.
+ * with the half-Gaussian start: absolute error 4e-15 for n <= 200.
  * nmax <= SHAPELET_NMAX, 0 < beta < infinity, m >= 0, else E_RANGE.  x may be
  * anything: infinite gives 0, NaN gives NaN.
  *

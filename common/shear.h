@@ -8,6 +8,15 @@
  *   (after rotation)           shapelet_pixel_sum
  *   no PSF, nout <= 60         shear_exact with nout = nmax + shear_growth, then shapelet_pixel
  *   no PSF, anything           shear_pixels: closed form in y, Gauss-Legendre in x
+ * Many objects under one shear: shear_matrix_coeff once per order, then shear_apply.
+ *
+ * Measured: worst error, and time on one AVX-512 core at nmax 12:
+ *   squeeze   7e-15 for orders <= 60, |t| <= 0.9             12 -> 28        8 us
+ *   exact     1.6e-15, flux kept to 2e-15                    12 -> 28       28 us
+ *   apply     the same                                       12 -> 28        3 us
+ *   series    3e-14 (elements up to 30) of its own formula   order 4         8 us
+ *   grid      1e-14 of peak, nmax <= 60, |g| <= 0.9          64 x 64        36 us
+ *   pixels    8e-15 of the flux, nmax <= 60, |g| <= 0.999    64 x 64, 0.4 beta  1.2 ms
  */
 #ifndef PIXSHEAR_SHEAR_H
 #define PIXSHEAR_SHEAR_H
@@ -19,7 +28,7 @@ MUST_CHECK int shear_matrix(double g1, double g2, double a[4]);
 
 /*
  * 1-D squeeze elements M[m*(nin+1) + n] = <phi_m | e^{-r/2} phi_n(e^{-r} x)>, t = tanh r,
- * m = 0..nout, n = 0..nin, by Gauss-Hermite (exact by degree, 5e-15).  -1 < t < 1; orders
+ * m = 0..nout, n = 0..nin, by Gauss-Hermite (exact by degree, 7e-15).  -1 < t < 1; orders
  * up to SHAPELET_NMAX.  Exactly 0 for odd m+n; the unit matrix for t = 0.
  */
 MUST_CHECK int shear_squeeze(int nin, int nout, double t, double *m);
