@@ -74,11 +74,12 @@ static void set_levels(struct view *v)
                     sample[n++] = p;
             }
     }
-    if (picture_levels(&v->levels, sample, n))
-        die(EXIT_RUN, "%s: --low and --high leave no range of values to show (%g to %g)", v->in,
-            v->levels.low, v->levels.high);
+    int st = picture_levels(&v->levels, sample, n);
     free(sample);
     free(row);
+    if (st)
+        die(EXIT_RUN, "%s: --low and --high leave no range of values to show (%g to %g)", v->in,
+            v->levels.low, v->levels.high);
 }
 
 /* One row of pixels as `zoom` rows of the picture. */
@@ -200,5 +201,7 @@ int main(int argc, char **argv)
             die(EXIT_RUN, "%s", e.text);
     }
     fits_in_close(v.f);
-    return 0;
+    free(crop.v);
+    free(c.argv);
+    return EXIT_DONE;
 }

@@ -244,7 +244,7 @@ static int image_cards(struct header *c, int first, int bitpix, const long *side
     if (st == OK)
         st = header_set_long(c, "NAXIS", naxis, "number of axes");
     for (int i = 0; i < naxis && st == OK; i++) {
-        char name[16];
+        char name[24];
         snprintf(name, sizeof name, "NAXIS%d", i + 1);
         st = header_set_long(c, name, side[i], NULL);
     }

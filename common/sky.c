@@ -74,14 +74,14 @@ static int parse(struct sky *s, const struct header *h, struct err *e)
 /* Set up the primary WCS and reduce it to its two celestial axes. */
 static int set_up(struct sky *s, struct err *e)
 {
-    int fixed[NWCSFIX], axes[2] = {WCSSUB_LONGITUDE, WCSSUB_LATITUDE}, two = 2;
+    int axes[2] = {WCSSUB_LONGITUDE, WCSSUB_LATITUDE}, two = 2;
     struct wcsprm *w = s->nwcs > 0 ? s->all : NULL;
     if (!w || w->naxis < 2)
         return E_MISSING;
     for (int i = 0; i < 2 && (w->altlin & 2) && w->naxis == 2; i++)
         if (w->cd[2 * i] == 0 && w->cd[2 * i + 1] == 0)    /* wcslib would put 1 degree here */
             return err_set(e, E_DATA, "WCS: the CD matrix is singular");
-    (void)wcsfix(0, NULL, w, fixed);          /* old spellings; what it cannot mend wcsset refuses */
+    (void)unitfix(0, w);                      /* old spellings of degree; the rest wcsset refuses */
     int st = wcsset(w);
     if (st)
         return wcs_failed(e, w, "WCS", st);

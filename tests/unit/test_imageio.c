@@ -46,7 +46,7 @@ static void pad(struct bytes *f, int with)
 /* Header of a primary or (ext) image HDU; `more` cards end with NULL. */
 static void head(struct bytes *f, int ext, int bitpix, int naxis, const long *side, const char *const *more)
 {
-    char key[16];
+    char key[24];
     card(f, ext ? "XTENSION= 'IMAGE   '" : "SIMPLE  =                    T");
     card_int(f, "BITPIX", bitpix);
     card_int(f, "NAXIS", naxis);
