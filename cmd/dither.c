@@ -165,5 +165,6 @@ int main(int argc, char **argv)
     free(record);
     header_free(&w.x.hdr);
     fits_in_close(w.in);
+    free(c.argv);
     return EXIT_DONE;
 }

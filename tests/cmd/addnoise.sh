@@ -1,5 +1,6 @@
 # addnoise: means and variances of every effect, header keywords, the keys of
 # the draws, depth, hard pixels, threads, pipes, faults.
+# shellcheck disable=SC2016
 F="perl $TOP/tests/fits.pl"
 pc="PIXSCALE=                  0.1"; ex="EXPTIME =               2000.0"; bu="BUNIT   = 'electron'"
 mz=$(awk 'BEGIN { printf "MAGZERO = %.12f", 26.65 + 2.5 * log(2000) / log(10) }')
@@ -91,6 +92,7 @@ near "MAGZERO from options" "$(card yes.fits MAGZERO)" 30 1e-9
 $F make rate.fits 8 8 1 "BUNIT   = 'electron/s'"
 fails "a rate image" 1 addnoise rate.fits -o no.fits
 head -c 4000 fifty.fits >cut.fits
+if addnoise fifty.fits >/dev/full 2>err.txt; then fail "a full device gave success"; else pass "a full device: $(cat err.txt)"; fi
 fails "truncated input" 1 addnoise cut.fits -o no.fits
 fails "missing input" 1 addnoise none.fits -o no.fits
 fails "output is the input" 1 addnoise fifty.fits -o fifty.fits

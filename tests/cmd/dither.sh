@@ -1,4 +1,5 @@
 # dither: exact sums, the layout and keywords of the contract, interlacing back.
+# shellcheck disable=SC2016
 F="perl $TOP/tests/fits.pl"
 cards=("PIXSCALE=                  0.1" "CCDSCALE=                  0.2" "EXPTIME =               2000.0" "BUNIT   = 'electron'" "MAGZERO =                 34.0" \
     "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRPIX1  =                 10.5" "CRPIX2  =                  9.0" "CRVAL1  =                150.0" "CRVAL2  =                  2.2" \
@@ -55,5 +56,6 @@ fails "-n 0" 2 dither -n 0 small.fits
 $F make sip.fits 9 9 1 "CTYPE1  = 'RA---TAN-SIP'" "CTYPE2  = 'DEC--TAN-SIP'" "CRVAL1  = 150.0" "CRVAL2  = 2.2" "CD1_1   = -2E-5" "CD2_2   = 2E-5" "A_ORDER =                    2" "A_2_0   = 1E-5" "B_ORDER =                    2"
 fails "SIP" 1 dither sip.fits -o no.fits
 head -c 3000 h.fits >cut.fits
+if dither h.fits >/dev/full 2>err.txt; then fail "a full device gave success"; else pass "a full device: $(cat err.txt)"; fi
 fails "truncated input" 1 dither cut.fits -o no.fits
 [ ! -e no.fits ] && pass "no output left behind" || fail "a failed run left an output"

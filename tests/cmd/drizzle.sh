@@ -1,5 +1,6 @@
 # drizzle: the paper's interlace as an exact copy, grids, units, keywords, weights,
 # context, order and threads, the reference images, refusals.
+# shellcheck disable=SC2016
 F="perl $TOP/tests/fits.pl"
 wcs() { # CRPIX1 CRPIX2 SCALE_DEG
     printf '%s\n' "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRVAL1  = 150.0" "CRVAL2  = 2.2" "CRPIX1  = $1" "CRPIX2  = $2" "CD1_1   = -$3" "CD1_2   = 0.0" "CD2_1   = 0.0" "CD2_2   = $3"
@@ -110,6 +111,12 @@ $F make s1.fits 15 15 7 "EXPTIME = 1.0" "${S1[@]}"; $F make s2.fits 15 15 7 "EXP
 ok "across the 0/360 seam" drizzle s1.fits s2.fits -o seam.fits
 between "seam: side of the output, 0.001 deg = 18 px apart" "$($F card seam.fits 1 NAXIS1)" 33 34
 
+# the pole, two exposures a quarter of a turn apart: a ramp meets itself turned
+for i in 1 2; do $F make p$i.fits 40 40 '10 + $x' "EXPTIME = 10.0" "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRVAL1  = $((i * 90)).0" "CRVAL2  = 89.9999" "CRPIX1  = 20.5" "CRPIX2  = 20.5" "CD1_1   = -5E-5" "CD1_2   = 0.0" "CD2_1   = 0.0" "CD2_2   = 5E-5"; done
+drizzle p1.fits p2.fits --units mean -o pole.fits
+near "pole: flux of both" "$(paste -d' ' <($F dump pole.fits 1) <($F dump pole.fits 2 | cut -d' ' -f3) | awk '$4 > 0 { s += $3 * $4 } END { printf "%.3f", s / 10 / 1600 / 2 }')" 29.5 1e-3
+near "pole: pixels fall on pixels, NOISECOR" "$($F card pole.fits 1 NOISECOR)" 1 0
+
 # ---- reference images
 T=$SHARED/truth/drizzle
 if [ -d "$T" ] && python3=$(command -v /usr/bin/python3) && $python3 -c 'import astropy' 2>/dev/null; then
@@ -149,6 +156,7 @@ fails "a grid of 10^9 pixels" 1 drizzle a.fits -x 1e-5 -o no.fits
 mapfile -t Z < <(wcs 8.0 8.0 0.0)
 $F make zero.fits 8 8 1 "${Z[@]}"
 fails "a singular WCS" 1 drizzle zero.fits -o no.fits
+if drizzle a.fits >/dev/full 2>err.txt; then fail "a full device gave success"; else pass "a full device: $(cat err.txt)"; fi
 fails "output is an input" 1 drizzle a.fits -o a.fits
 head -c 3000 a.fits >cut.fits
 fails "truncated input" 1 drizzle cut.fits -o no.fits
