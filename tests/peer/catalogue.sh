@@ -1,5 +1,8 @@
 # Do other people's readers understand our catalogues?  Names, units, types and every number.
 ok "a scene and its models" galgen -n 200 --models m.txt -o s.txt
+# the data of an image of 600 x 600 pixels: the last 500 blocks
+pixels() { tail -c 1440000 "$1"; }
+ok "an image" simage s.txt --models m.txt -x 0.1 --size 600,600 -o image.fits
 ok "stars" galgen --stars -o stars.txt
 py=$(for p in python3 /usr/bin/python3; do "$p" -c 'import numpy' 2>/dev/null && { command -v "$p"; break; }; done)
 if [ -n "$py" ]; then
@@ -23,6 +26,11 @@ print(','.join(t.colnames), len(t), t['DX'].unit, t['DX'].description)
 rows = [l.split() for l in open('s.txt') if l[0] != '#']
 print(all(float(r[i]) == float(t[c][k]) for k, r in enumerate(rows) for i, c in enumerate(t.colnames) if c != 'TYPE'))
 P
+    "$py" -c "
+from astropy.table import Table
+Table.read('s.txt', format='ascii').write('ap.fits')" 2>>astropy.err
+    ok "astropy's FITS table as a scene" simage ap.fits --models m.txt -x 0.1 --size 600,600 -o ap_image.fits
+    same "gives the same pixels" <(pixels ap_image.fits) <(pixels image.fits)
     same "astropy ascii.read" astropy.out <(printf '%s\n' "ID,DX,DY,MAG,TYPE,MODEL,RE,Q,PA,BT 200 arcsec Position from the field centre, rightwards" True)
 else
     skip "astropy is not here"
@@ -32,6 +40,9 @@ if command -v asttable >/dev/null; then
     near "asttable: columns with unit and type" "$(grep -cE '^[0-9]+ +(ID +n/a +int64|DX +arcsec +float64|TYPE +n/a +string|PA +deg +float64) ' table.out)" 4 0
     near "asttable: rows" "$(sed -n 's/^Number of rows: //p' table.out)" 200 0
     same "asttable: numbers" <(asttable s.txt -cDX | awk '{ printf "%.7f\n", $1 }') <(col s.txt DX | awk '{ printf "%.7f\n", $1 }')
+    asttable s.txt --output=g.txt 2>>table.err
+    ok "asttable's text table as a scene" simage g.txt --models m.txt -x 0.1 --size 600,600 -o g_image.fits
+    same "gives the same pixels" <(pixels g_image.fits) <(pixels image.fits)
 else
     skip "asttable is not here"
 fi
