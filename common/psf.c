@@ -51,15 +51,15 @@ static void apply_factors(const struct otf *t, double diffusion, double pixel, c
         }
 }
 
-/* `finer` = 2 halves the spacing of the nodes of samples. */
-static int nodes_fine(const struct otf *t, double diffusion, double pixel, int finer, struct nodes *made)
+/* `finer` = 2 halves the spacing of the nodes of samples; only |u_x|, |u_y| <= reach are wanted of them. */
+static int nodes_fine(const struct otf *t, double diffusion, double pixel, int finer, double reach, struct nodes *made)
 {
     if (!(diffusion >= 0) || !isfinite(diffusion) || !(pixel >= 0) || !isfinite(pixel) || (!t->n && !t->p))
         return E_RANGE;
     struct nodes g = {.n = t->n, .du = t->du};
     if (t->p) {
         g.du = 1 / psf_period(t) / finer;
-        double half = floor(t->ucut / g.du + 1e-9);
+        double half = floor(fmin(t->ucut, reach) / g.du + 1e-9);
         if (!(half < 8192))
             return E_RANGE;
         g.n = 2 * (int)half + 1;
@@ -92,7 +92,7 @@ static int nodes_fine(const struct otf *t, double diffusion, double pixel, int f
 
 static int nodes_make(const struct otf *t, double diffusion, double pixel, struct nodes *made)
 {
-    return nodes_fine(t, diffusion, pixel, 1, made);
+    return nodes_fine(t, diffusion, pixel, 1, INFINITY, made);
 }
 
 /* Drop the outer nodes, all below 1e-6 of T(0). */
@@ -123,7 +123,7 @@ int psf_table(const struct otf *t, double diffusion, double pixel, struct otf *o
     struct nodes g = {0};
     if (t->chdiff < 0 || (pixel > 0 && t->pixel > 0))
         return E_RANGE;
-    int status = nodes_fine(t, diffusion, pixel, 2, &g);
+    int status = nodes_fine(t, diffusion, pixel, 2, INFINITY, &g);
     if (status)
         return status;
     double ucut = t->ucut;
@@ -365,6 +365,9 @@ static void raw_moments(const struct nodes *g, const double *fx, const double *f
         m[k] *= g->du * g->du;
 }
 
+/* The transform of a weight of width w is below 1e-22 of its peak beyond |u| = this / w. */
+#define WEIGHT_REACH 1.6
+
 /* Moments on nodes already made. */
 static int nodes_moments(const struct nodes *g, double width, double x0, double y0, double m[PSF_MOMENTS])
 {
@@ -395,7 +398,7 @@ int psf_moments(const struct otf *t, double diffusion, double pixel, double widt
     if (!moments_valid(t, width, x0, y0))
         return E_RANGE;
     struct nodes g;
-    int status = nodes_make(t, diffusion, pixel, &g);
+    int status = nodes_fine(t, diffusion, pixel, 1, WEIGHT_REACH / width, &g);
     if (status)
         return status;
     status = nodes_moments(&g, width, x0, y0, m);
@@ -408,7 +411,7 @@ int psf_centroid(const struct otf *t, double diffusion, double pixel, double wid
     if (!moments_valid(t, width, 0, 0))
         return E_RANGE;
     struct nodes g = {0};
-    int status = nodes_make(t, diffusion, pixel, &g);
+    int status = nodes_fine(t, diffusion, pixel, 1, WEIGHT_REACH / width, &g);
     double x = 0, y = 0, m[PSF_MOMENTS], w2 = width * width;
     for (int i = 0; status == OK; i++) {
         status = i < 100 && moments_valid(t, width, x, y) ? nodes_moments(&g, width, x, y, m) : E_NOCONV;

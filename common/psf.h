@@ -60,7 +60,7 @@ int psf_moment_index(int a, int b);
  * integral of W (x-x0)^a (y-y0)^b PSF / S, arcsec^(a+b).  All space, no cut-off, no sampling: with
  * `pixel` the pixel scale this is what sums over the pixels of a star tend to, averaged over its
  * position in the pixel.  Parseval's sum over the nodes of t with the weight's own transform, exact
- * for the periodic PSF while width < period/16; E_RANGE above that.
+ * for the periodic PSF while width < period/16; E_RANGE above that.  1 ms for the default table; for samples some 10 ms.
  */
 MUST_CHECK int psf_moments(const struct otf *t, double diffusion, double pixel, double width, double x0,
                            double y0, double m[PSF_MOMENTS]);
