@@ -73,7 +73,7 @@ if command -v python3 >/dev/null; then
 fi
 for ((i = 0; i < 70; i++)); do printf '\177\300\000\000'; done | image 10 7 -32 >nan.fits
 ok "nothing but NaN" fits2png nan.fits -o nan.png
-fits2png a.fits >p.png; fits2png <a.fits -o q.png; cat a.fits | fits2png - -o r.png; fits2png a.fits -o s.png
+fits2png a.fits >p.png; fits2png <a.fits -o q.png; fits2png - -o r.png < <(cat a.fits); fits2png a.fits -o s.png
 same "to standard output" p.png s.png; same "from a file on standard input" q.png s.png; same "from a pipe" r.png s.png
 gzip -k a.fits; fits2png a.fits.gz -o g.png; same "from gzip" g.png s.png
 if command -v pngcheck >/dev/null; then ok "pngcheck finds nothing" pngcheck -q s.png b.png nan.png; fi

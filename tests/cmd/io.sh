@@ -1,6 +1,7 @@
 # Faults of output and input: full disk, closed pipe, kill at random moments,
 # output equal to input, closed descriptors, file size limit.  The program is
 # the copier that the unit tests build, and fits2png.
+# shellcheck disable=SC2002,SC2010,SC2016   # pipes are what is tested; $0 is for the inner shell
 copy=
 for d in "$BIN/../unit" "$TOP/build/unit"; do
     if [ -x "$d/test_fitscopy" ]; then copy=$(cd "$d" && pwd)/test_fitscopy; break; fi
