@@ -28,6 +28,7 @@ struct params {
     int stars;
     double star_mag;
     long nmax;               /* -1: by magnitude */
+    int turn;                /* quarter turns of the finished field, anticlockwise */
     struct population recipe;
 };
 
@@ -363,6 +364,30 @@ static void make_from_library(struct table *t, const struct models *m, const str
     free(shelf);
 }
 
+/* ---- the field as a whole ---- */
+
+/* Turn positions and galaxies about the field centre by quarter turns. */
+static void turn_field(struct table *t, int quarters)
+{
+    static const int cosine[4] = {1, 0, -1, 0}, sine[4] = {0, 1, 0, -1};
+    double *x = table_reals(t, "DX"), *y = table_reals(t, "DY"), *rot = table_reals(t, "ROT"), *pa = table_reals(t, "PA");
+    if (quarters == 0)
+        return;
+    if (!rot && table_find(t, "MODEL")) {
+        rot = add_real(t, "ROT", "deg", "Rotation anticlockwise, after parity");
+        memset(rot, 0, t->nrow * sizeof *rot);
+    }
+    for (size_t i = 0; i < t->nrow; i++) {
+        double u = x[i], v = y[i];
+        x[i] = cosine[quarters] * u - sine[quarters] * v;
+        y[i] = sine[quarters] * u + cosine[quarters] * v;
+        if (rot)
+            rot[i] = nine(fmod(rot[i] + 90 * quarters, 360));
+        if (pa)
+            pa[i] = nine(fmod(pa[i] + 90 * quarters, 180));
+    }
+}
+
 /* ---- main ---- */
 
 static void write_table(const struct table *t, const char *name, const char *record, const struct params *p)
@@ -389,6 +414,7 @@ int main(int argc, char **argv)
         {"library-mags", 0, OPT_CHOICE, &p.library_mags, 0, 0, NULL, "magnitudes of library galaxies", "counts|own", 0},
         {"stars", 0, OPT_FLAG, &p.stars, 0, 0, NULL, "stars instead of galaxies", NULL, 0},
         {"star-mag", 0, OPT_REAL, &p.star_mag, -10, 60, "MAG", "AB magnitude of stars", NULL, 0},
+        {"turn", 0, OPT_CHOICE, &p.turn, 0, 0, NULL, "turn the finished field, deg anticlockwise", "0|90|180|270", 0},
         {"nmax", 0, OPT_LONG, &p.nmax, -1, GAUSSIANS_NMAX, "N", "order; -1: 12, 8, 4 below 26, 28 mag and beyond", NULL, 0},
         {"size", 0, OPT_REAL, &p.recipe.size, 1e-3, 100, "ARCSEC", "median half-light radius at magnitude 22.25", NULL, 0},
         {"size-scatter", 0, OPT_REAL, &p.recipe.scatter, 0, 2, "S", "scatter of its natural logarithm", NULL, 0},
@@ -419,6 +445,7 @@ int main(int argc, char **argv)
         make_from_library(&scene, &library, &p, &c);
     else
         make_galaxies(&scene, &models, &p, &c);
+    turn_field(&scene, p.turn);
     if (p.models)
         write_table(&models, p.models, record, &p);
     write_table(&scene, c.out, record, &p);

@@ -116,6 +116,26 @@ ok "the text library" galgen --library m100.txt -n 30 -o f2.txt
 same "FITS and text libraries give the same galaxies" <(grep -v '^#' f1.txt) <(grep -v '^#' f2.txt)
 
 
+# ---- the field turned ----
+ok "turned by 90" galgen -n 100 --turn 90 --models m90.txt -o s90.txt
+same "the coefficients stay" <(grep -v '^#' m90.txt) <(grep -v '^#' m100.txt)
+near "(x,y) goes to (-y,x), ROT 90" "$(paste <(grep -v '^#' s90.txt) <(grep -v '^#' s100.txt) | awk '$2 != -$14 || $3 != $13 || $11 != 90' | wc -l)" 0 0
+ok "library turned by 270" galgen --library lib.txt -n 30 --turn 270 -o l270.txt
+ok "library not turned" galgen --library lib.txt -n 30 -o l0.txt
+near "ROT grows by 270" "$(paste <(col l270.txt ROT) <(col l0.txt ROT) | awk '{ d = ($1 - $2 + 720) % 360 - 270; if (d < 0) d = -d; if (d > w) w = d } END { print w }')" 0 1e-6
+if [ -x "$BIN/simage" ]; then
+    values() { tail -c $((2880 * 56)) "$1" | head -c 160000 | od -An -v -w4 --endian=big -tf4; }
+    ok "turned by 180" galgen -n 40 --field 20 --turn 180 --models m40.txt -o s180.txt
+    ok "not turned" galgen -n 40 --field 20 --models m40.txt -o s0.txt
+    ok "an image of it" simage s180.txt --models m40.txt -x 0.1 --size 200,200 -o i180.fits
+    ok "and of the field itself" simage s0.txt --models m40.txt -x 0.1 --size 200,200 -o i0.fits
+    read -r diff peak <<<"$(paste <(values i180.fits) <(values i0.fits | tac) | awk '{ d = $1 - $2; if (d < 0) d = -d; if (d > w) w = d; if ($1 > p) p = $1 } END { print w + 0, p }')"
+    between "peak, electrons" "$peak" 10 1e6
+    between "difference of the image turned back, electrons" "$diff" 0 "$(awk -v p="$peak" 'BEGIN { print 2e-6 * p }')"
+else
+    skip "turned image: simage is not built"
+fi
+
 # ---- compressed ----
 gzip -k m100.txt m100.fits
 for f in m100.txt.gz m100.fits.gz; do
@@ -140,7 +160,7 @@ fails "an operand" 2 galgen --stars x
 fails "stars and library" 2 galgen --stars --library lib.txt
 fails "both on standard output" 2 galgen --models -
 fails "too many" 2 galgen --field 100000 --models x
-fails "missing library" 1 galgen --library none.txt
+fails "missing library" 1 galgen --library absent.txt
 fails "library is the output" 1 galgen --library lib.txt -o lib.txt
 fails "no folder" 1 galgen -n 3 --models none/m.txt
 fails "memory" 1 galgen -n 1000000 --models big.txt --max-memory 10M
