@@ -274,42 +274,31 @@ int shapelet_pixel(int nmax, double beta, int m, const double *edge, double *b)
     return OK;
 }
 
-/* Eight neighbouring columns: compilers keep sums of this type in registers, sums in arrays not always. */
-typedef double eight __attribute__((vector_size(64)));
-
-/* v[n2][k] = sum over n1 of c_n1n2 times columns 8k..8k+7 of bx, w <= STRIP columns; zeros beyond. */
-static inline void strip_rows(int nmax, const double *c, int w, size_t m1, const double *bx, eight (*v)[STRIP / 8])
-{
-    for (int n1 = 0; n1 <= nmax; n1++) {
-        double x[STRIP] = {0};
-        eight column[STRIP / 8];
-        memcpy(x, bx + (size_t)n1 * m1, (size_t)w * sizeof *x);
-        memcpy(column, x, sizeof column);
-        for (int n2 = 0; n2 <= nmax - n1; n2++) {
-            const double f = c[shapelet_index(n1, n2)];
-            for (int k = 0; k < STRIP / 8; k++)
-                v[n2][k] = n1 ? v[n2][k] + f * column[k] : f * column[k];
-        }
-    }
-}
-
-/* w <= STRIP columns of shapelet_pixel_sum. */
+/* One strip of w <= STRIP columns of shapelet_pixel_sum. */
 WIDE static void sum_strip(int nmax, const double *c, int w, size_t m1, const double *bx,
                            size_t m2, const double *by, double *out)
 {
-    eight v[SHAPELET_NMAX + 1][STRIP / 8];
-    strip_rows(nmax, c, w, m1, bx, v);
+    double v[(SHAPELET_NMAX + 1) * STRIP];
+    for (int n2 = 0; n2 <= nmax; n2++) {
+        double *restrict row = v + n2 * STRIP;
+        for (int i = 0; i < STRIP; i++)
+            row[i] = 0;
+        for (int n1 = 0; n1 <= nmax - n2; n1++) {
+            const double f = c[shapelet_index(n1, n2)];
+            const double *restrict x = bx + (size_t)n1 * m1;
+            for (int i = 0; i < w; i++)
+                row[i] += f * x[i];
+        }
+    }
     for (size_t j = 0; j < m2; j++) {
-        eight a = {0}, b = {0}, d = {0}, e = {0};
+        double sum[STRIP] = {0};
         for (int n2 = 0; n2 <= nmax; n2++) {
             const double f = by[(size_t)n2 * m2 + j];
-            a += f * v[n2][0];
-            b += f * v[n2][1];
-            d += f * v[n2][2];
-            e += f * v[n2][3];
+            const double *restrict row = v + n2 * STRIP;
+            for (int i = 0; i < STRIP; i++)
+                sum[i] += f * row[i];
         }
-        const eight sum[STRIP / 8] = {a, b, d, e};
-        memcpy(out + j * m1, sum, (size_t)w * sizeof *out);
+        memcpy(out + j * m1, sum, (size_t)w * sizeof *sum);
     }
 }
 
