@@ -213,13 +213,14 @@ static void report(const struct otf *t, double fwhm, int n, const double *image)
 }
 
 /* Factors, width, image, file. */
-static void make(const struct psfgen *g, const struct common *c, const struct otf *bare, int cells, const char *record)
+static void make(const struct psfgen *g, const struct common *c, struct otf *bare, int cells, const char *record)
 {
     struct otf t = {0};
     struct header h = {0};
     struct err e;
     int n = (int)g->size;
     must(psf_table(bare, g->diffusion, g->pixel, &t));
+    otf_free(bare);
     if (n * g->scale > psf_period(&t))
         die(EXIT_RUN, "an image of %g arcsec is longer than the PSF's period of %g arcsec: reduce --size or --scale", n * g->scale,
             psf_period(&t));

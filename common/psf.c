@@ -12,17 +12,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* T times its factors on a regular grid: n x n (n odd), centred on u = 0. */
+/* T on a regular grid, n x n (n odd), centred on u = 0, to be multiplied by f[i] f[j]. */
 struct nodes {
     int n;
     double du;
     double *re, *im;           /* im NULL when T is real */
+    double *f;                 /* factors along an axis; 0 beyond the cut-off */
+    int borrowed;              /* re and im belong to the transfer function */
 };
 
 static void nodes_free(struct nodes *g)
 {
-    free(g->re);
-    free(g->im);
+    if (!g->borrowed) {
+        free(g->re);
+        free(g->im);
+    }
+    free(g->f);
 }
 
 double psf_period(const struct otf *t)
@@ -32,23 +37,20 @@ double psf_period(const struct otf *t)
     return 2 * t->scale * (t->nx_p > t->ny_p ? t->nx_p : t->ny_p);
 }
 
-/* Multiply by the two factors and cut at t->ucut. */
-static void apply_factors(const struct otf *t, double diffusion, double pixel, const double *u, double *f,
-                          struct nodes *g)
+/* Factors along an axis for n nodes du apart. */
+static double *axis_factors(const struct otf *t, double diffusion, double pixel, int n, double du, double *u)
 {
-    int n = g->n;
-    for (int i = 0; i < n; i++)
+    double *f = malloc((size_t)n * sizeof *f);
+    if (!f)
+        return NULL;
+    for (int i = 0; i < n; i++) {
+        u[i] = (i - n / 2) * du;
         f[i] = fabs(u[i]) <= t->ucut * (1 + 1e-12);
+    }
     otf_diffusion(n, u, diffusion, f);
     if (pixel > 0)
         otf_box(n, u, pixel, f);
-    for (int j = 0; j < n; j++)
-        for (int i = 0; i < n; i++) {
-            size_t at = (size_t)j * (size_t)n + (size_t)i;
-            g->re[at] *= f[j] * f[i];
-            if (g->im)
-                g->im[at] *= f[j] * f[i];
-        }
+    return f;
 }
 
 /* `finer` = 2 halves the spacing of the nodes of samples; only |u_x|, |u_y| <= reach are wanted of them. */
@@ -56,7 +58,7 @@ static int nodes_fine(const struct otf *t, double diffusion, double pixel, int f
 {
     if (!(diffusion >= 0) || !isfinite(diffusion) || !(pixel >= 0) || !isfinite(pixel) || (!t->n && !t->p))
         return E_RANGE;
-    struct nodes g = {.n = t->n, .du = t->du};
+    struct nodes g = {.n = t->n, .du = t->du, .re = t->re, .im = t->im, .borrowed = 1};
     if (t->p) {
         g.du = 1 / psf_period(t) / finer;
         double half = floor(fmin(t->ucut, reach) / g.du + 1e-9);
@@ -64,24 +66,16 @@ static int nodes_fine(const struct otf *t, double diffusion, double pixel, int f
             return E_RANGE;
         g.n = 2 * (int)half + 1;
     }
-    size_t count = (size_t)g.n * (size_t)g.n;
-    double *u = malloc(2 * (size_t)g.n * sizeof *u);
-    g.re = malloc(count * sizeof *g.re);
-    g.im = otf_is_real(t) ? NULL : malloc(count * sizeof *g.im);
-    int status = u && g.re && (g.im || otf_is_real(t)) ? OK : E_NOMEM;
-    if (status == OK) {
-        for (int i = 0; i < g.n; i++)
-            u[i] = (i - g.n / 2) * g.du;
-        if (t->p) {
-            status = otf_grid(t, g.n, u, g.n, u, g.re, g.im);
-        } else {
-            memcpy(g.re, t->re, count * sizeof *g.re);
-            if (g.im)
-                memcpy(g.im, t->im, count * sizeof *g.im);
-        }
+    double *u = malloc((size_t)g.n * sizeof *u);
+    g.f = u ? axis_factors(t, diffusion, pixel, g.n, g.du, u) : NULL;
+    int status = g.f ? OK : E_NOMEM;
+    if (status == OK && t->p) {
+        size_t bytes = (size_t)g.n * (size_t)g.n * sizeof *g.re;
+        g.re = malloc(bytes);
+        g.im = malloc(bytes);
+        g.borrowed = 0;
+        status = g.re && g.im ? otf_grid(t, g.n, u, g.n, u, g.re, g.im) : E_NOMEM;
     }
-    if (status == OK)
-        apply_factors(t, diffusion, pixel, u, u + g.n, &g);
     free(u);
     if (status)
         nodes_free(&g);
@@ -95,46 +89,50 @@ static int nodes_make(const struct otf *t, double diffusion, double pixel, struc
     return nodes_fine(t, diffusion, pixel, 1, INFINITY, made);
 }
 
-/* Drop the outer nodes, all below 1e-6 of T(0). */
-static void nodes_trim(struct nodes *g)
+/* Nodes beyond which all are below 1e-6 of T(0): half side. */
+static int nodes_extent(const struct nodes *g)
 {
     int h = g->n / 2, keep = 0;
-    double least = 1e-6 * fabs(g->re[(size_t)h * (size_t)g->n + (size_t)h]);
+    double least = 1e-6 * fabs(g->re[(size_t)h * (size_t)g->n + (size_t)h] * g->f[h] * g->f[h]);
     for (int j = -h; j <= h; j++)
         for (int i = -h; i <= h; i++) {
             size_t at = (size_t)(j + h) * (size_t)g->n + (size_t)(i + h);
             int reach = abs(i) > abs(j) ? abs(i) : abs(j);
-            if (reach > keep && hypot(g->re[at], g->im ? g->im[at] : 0) >= least)
+            if (reach > keep && hypot(g->re[at], g->im ? g->im[at] : 0) * fabs(g->f[j + h] * g->f[i + h]) >= least)
                 keep = reach;
         }
-    keep = keep < h ? keep + 1 : h;
-    int n = 2 * keep + 1;
-    for (int j = 0; j < n; j++) {
-        size_t from = (size_t)(j + h - keep) * (size_t)g->n + (size_t)(h - keep), to = (size_t)j * (size_t)n;
-        memmove(g->re + to, g->re + from, (size_t)n * sizeof *g->re);
-        if (g->im)
-            memmove(g->im + to, g->im + from, (size_t)n * sizeof *g->im);
-    }
-    g->n = n;
+    return keep < h ? keep + 1 : h;
+}
+
+/* The inner n x n values of one plane times the factors, allocated. */
+static double *nodes_plane(const struct nodes *g, const double *v, int n)
+{
+    double *out = malloc((size_t)n * (size_t)n * sizeof *out);
+    int skip = (g->n - n) / 2;
+    for (int j = 0; out && j < n; j++)
+        for (int i = 0; i < n; i++)
+            out[(size_t)j * (size_t)n + (size_t)i] = v[(size_t)(j + skip) * (size_t)g->n + (size_t)(i + skip)] *
+                                                     g->f[j + skip] * g->f[i + skip];
+    return out;
 }
 
 int psf_table(const struct otf *t, double diffusion, double pixel, struct otf *out)
 {
-    struct nodes g = {0};
-    if (t->chdiff < 0 || (pixel > 0 && t->pixel > 0))
+    struct nodes g;
+    if (pixel > 0 && t->pixel > 0)
         return E_RANGE;
     int status = nodes_fine(t, diffusion, pixel, 2, INFINITY, &g);
     if (status)
         return status;
-    double ucut = t->ucut;
-    if (t->p) {
-        nodes_trim(&g);
-        ucut = fmin(ucut, (g.n / 2) * g.du);
-    }
-    struct otf made;
-    status = otf_nodes(&made, g.n, g.du, ucut, g.re, g.im);
+    int n = t->p ? 2 * nodes_extent(&g) + 1 : g.n;
+    double ucut = t->p ? fmin(t->ucut, (n / 2) * g.du) : t->ucut;
+    double *re = nodes_plane(&g, g.re, n), *im = g.im ? nodes_plane(&g, g.im, n) : NULL;
+    struct otf made = {0};
+    status = re && (im || !g.im) ? otf_nodes(&made, n, g.du, ucut, re, im) : E_NOMEM;
+    nodes_free(&g);
     if (status) {
-        nodes_free(&g);
+        free(re);
+        free(im);
         return status;
     }
     made.chdiff = hypot(t->chdiff, diffusion);
@@ -151,15 +149,20 @@ int psf_image(const struct otf *t, double diffusion, double pixel, int nx, int n
     int status = nodes_make(t, diffusion, pixel, &g);
     if (status)
         return status;
-    size_t count = (size_t)g.n * (size_t)g.n, pixels = (size_t)nx * (size_t)ny;
-    double *in = malloc(2 * count * sizeof *in), *out = malloc(2 * pixels * sizeof *out);
+    /* T(-u) is the conjugate of T(u): the rows u_y > 0 count twice, the others not at all */
+    int h = g.n / 2;
+    size_t pixels = (size_t)nx * (size_t)ny;
+    double *in = malloc(2 * (size_t)(h + 1) * (size_t)g.n * sizeof *in), *out = malloc(2 * pixels * sizeof *out);
     status = in && out ? OK : E_NOMEM;
-    if (status == OK) {
-        for (size_t i = 0; i < count; i++) {
-            in[2 * i] = g.re[i];
-            in[2 * i + 1] = g.im ? g.im[i] : 0;
+    for (int j = 0; status == OK && j <= h; j++)
+        for (int i = 0; i < g.n; i++) {
+            size_t from = (size_t)(j + h) * (size_t)g.n + (size_t)i, to = (size_t)j * (size_t)g.n + (size_t)i;
+            double f = (j ? 2 : 1) * g.f[j + h] * g.f[i];
+            in[2 * to] = f * g.re[from];
+            in[2 * to + 1] = g.im ? f * g.im[from] : 0;
         }
-        struct fft_grid from = {g.n, g.n, -(g.n / 2), -(g.n / 2)}, to = {nx, ny, -(nx - 1) / 2.0, -(ny - 1) / 2.0};
+    if (status == OK) {
+        struct fft_grid from = {g.n, h + 1, -h, 0}, to = {nx, ny, -(nx - 1) / 2.0, -(ny - 1) / 2.0};
         status = fft_zoom(&from, in, &to, out, g.du * scale, g.du * scale, +1);
     }
     double area = g.du * scale * g.du * scale;
@@ -199,7 +202,7 @@ static int rings_make(const struct otf *t, double diffusion, double pixel, struc
     for (int j = 0; j < g.n; j++)
         for (int i = 0; i < g.n; i++) {
             long x = i - (long)h, y = j - (long)h;
-            r.s[x * x + y * y] += g.re[(size_t)j * (size_t)g.n + (size_t)i];
+            r.s[x * x + y * y] += g.re[(size_t)j * (size_t)g.n + (size_t)i] * g.f[j] * g.f[i];
         }
     for (size_t q = 0; q < q_count; q++)
         if (r.s[q] != 0) {
@@ -316,13 +319,15 @@ int psf_moment_index(int a, int b)
 }
 
 /*
- * Transforms of x^a W(x), a = 0..4, at each u, with the shift to x0: f[(a*n + i)*2] complex,
+ * Transforms of x^a W(x), a = 0..4, at each u, times the factors, with the shift to x0: f[(a*n + i)*2] complex,
  * int x^a exp(-x^2/2w^2 + 2 pi i u (x + x0)) dx; 0 where the Gaussian is below 1e-40.
  */
-static void weight_terms(int n, double du, double w, double x0, double *f)
+static void weight_terms(const struct nodes *grid, double w, double x0, double *f)
 {
+    int n = grid->n;
     for (int i = 0; i < n; i++) {
-        double u = (i - n / 2) * du, k = 2 * M_PI * u, s = w * w * k, g = w * sqrt(2 * M_PI) * exp(-0.5 * s * k);
+        double u = (i - n / 2) * grid->du, k = 2 * M_PI * u, s = w * w * k;
+        double g = grid->f[i] * w * sqrt(2 * M_PI) * exp(-0.5 * s * k);
         double h[5] = {1, s, w * w - s * s, 3 * w * w * s - s * s * s,
                        3 * w * w * w * w - 6 * w * w * s * s + s * s * s * s};
         double turn = remainder(u * x0, 1), c = g * cos(2 * M_PI * turn), d = g * sin(2 * M_PI * turn);
@@ -374,8 +379,8 @@ static int nodes_moments(const struct nodes *g, double width, double x0, double 
     double *f = malloc(20 * (size_t)g->n * sizeof *f), v[PSF_MOMENTS];
     if (!f)
         return E_NOMEM;
-    weight_terms(g->n, g->du, width, x0, f);
-    weight_terms(g->n, g->du, width, y0, f + 10 * (size_t)g->n);
+    weight_terms(g, width, x0, f);
+    weight_terms(g, width, y0, f + 10 * (size_t)g->n);
     raw_moments(g, f, f + 10 * (size_t)g->n, v);
     free(f);
     if (!(v[0] > 0))

@@ -94,6 +94,15 @@ static void scale_flux(size_t n, double *v, double flux, const struct psf_option
         v[i] /= flux;
 }
 
+/* T(-u) is the conjugate of T(u), to 1e-9 of T(0): the PSF is real. */
+static int hermitian(size_t count, const double *re, const double *im)
+{
+    double worst = 0, tol = 1e-9 * re[count / 2];
+    for (size_t i = 0; i <= count / 2; i++)
+        worst = fmax(worst, fmax(fabs(re[i] - re[count - 1 - i]), im ? fabs(im[i] + im[count - 1 - i]) : 0));
+    return worst <= tol;
+}
+
 static int read_otf(struct fits_in *f, const char *name, int index, const struct psf_options *o, struct otf *t,
                     struct psf_info *info, const struct header *h, struct err *e)
 {
@@ -119,6 +128,8 @@ static int read_otf(struct fits_in *f, const char *name, int index, const struct
     int complex = 0;
     for (size_t i = count; d->nz == 2 && i < 2 * count; i++)
         complex |= v[i] != 0;
+    if (status == OK && !hermitian(count, v, complex ? v + count : NULL))
+        status = err_set(e, E_DATA, "%s: extension OTF: T(-u) is not the conjugate of T(u): write it again with psfgen", name);
     if (status == OK) {
         scale_flux((size_t)d->nz * count, v, v[count / 2], o, info);
         status = otf_tabulate(t, (int)d->nx, dx, ucut, v, complex ? v + count : NULL);

@@ -40,6 +40,7 @@ near "an option that repeats the default changes nothing" "$(card explicit.fits 
 python=$(for p in python3 /usr/bin/python3; do "$p" -c 'import numpy, astropy.io.fits' 2>/dev/null && { echo "$p"; break; }; done)
 if [ -n "$python" ]; then
     psfgen --zernike 8:0.06,3:-0.2 --pixel 0.05 -n 80 -x 0.03 -o odd.fits
+    psfgen --zernike 2:0.5,3:0.25 -d 0 -n 65 -x 0.02 -o tilt.fits
     "$python" - >py.txt 2>py.err <<'END'
 import numpy as np
 from astropy.io import fits
@@ -56,7 +57,9 @@ direct = (e @ t @ e.T).real * (du * h["CDELT1"]) ** 2
 print("dft", np.abs(direct - im).max() / im.max())
 print("zero", abs(t[len(u) // 2, len(u) // 2] - 1))
 print("hermitian", np.abs(t - t[::-1, ::-1].conj()).max())
-# tilt of -0.2 waves in Z3: centroid of the core moved by -0.8 lambda/D
+# Z2 = .5: 2 lambda/D = .1691" to the right, Z3 = .25: .0846" up
+peak = np.unravel_index(np.argmax(read("tilt.fits")[0]), (65, 65))
+print("right", peak[1] - 32, "up", peak[0] - 32)
 im, h, t, u, du = read("psf.fits")
 print("real", np.abs(t.imag).max(), "edge", np.abs(t[0]).max() + np.abs(t[:, 0]).max())
 print("cut", abs(u[-1] - 2 / 820e-9 * np.pi / 180 / 3600))
@@ -77,6 +80,8 @@ print("pupil", worst)
 END
     v() { awk -v k="$1" '{ for (i = 1; i < NF; i++) if ($i == k) print $(i + 1) }' py.txt; }
     between "image is the inverse transform of the OTF, of the peak (float32)" "$(v dft)" 0 6e-8
+    near "0.5 waves of Z2 move the image right by 2 lambda/D, samples" "$(v right)" 8 0
+    near "0.25 waves of Z3 move it up by lambda/D" "$(v up)" 4 0
     between "T(0) - 1" "$(v zero)" 0 1e-15
     between "T is Hermitian" "$(v hermitian)" 0 1e-15
     between "without aberration T is real" "$(v real)" 0 0

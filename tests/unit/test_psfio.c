@@ -169,6 +169,11 @@ static void our_file(void)
     bad = psf_read("ours.fits[OTF]", &o, &back, &info, &e);
     check_that(!bad && info.from_otf && back.n == all.n, "or the table");
     otf_free(&back);
+    all.im[7 * all.n + 60] += 1e-3;
+    all.re[all.n] += 1e-3;
+    bad = psf_write("skew.fits", 40, 30, im, &all, &h, "test", NULL, 0, &e);
+    check_that(!bad, "a table that no real PSF has");
+    refused("skew.fits", &o, E_DATA, "conjugate");
     otf_free(&t);
     otf_free(&all);
     header_free(&h);
