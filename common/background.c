@@ -20,31 +20,21 @@ enum { BINS = 1024, SAMPLE = 1024, LANES = 8 };
 /* Counts, and running sums below each edge: number, sum of k, sum of k^2. */
 struct histogram {
     double lo, width;
-    uint32_t count[BINS];
+    uint32_t tally[BINS + 2], *count;   /* count = tally + 1: without what is out of range */
     int64_t n[BINS + 1], k[BINS + 1], kk[BINS + 1];
 };
 
-/* Number, sum and sum of squares of v[i] - pivot with |v - pivot - centre| <= reach. */
-WIDE static void clipped_sums(const float *v, long n, long step, double pivot, double centre,
-                              double reach, double out[3])
+/* Number, sum and sum of squares of t with |t - centre| <= reach; n is a multiple of LANES. */
+WIDE static void clipped_sums(const double *t, long n, double centre, double reach, double out[3])
 {
     double c[LANES] = {0}, s[LANES] = {0}, q[LANES] = {0};
-    long m = n / step / LANES * LANES;
-    for (long i = 0; i < m; i += LANES)
+    for (long i = 0; i < n; i += LANES)
         for (int j = 0; j < LANES; j++) {
-            double t = (double)v[(i + j) * step] - pivot;
-            double w = fabs(t - centre) <= reach ? 1 : 0;
+            double v = t[i + j], w = fabs(v - centre) <= reach ? 1 : 0;
             c[j] += w;
-            s[j] += w * t;
-            q[j] += w * t * t;
+            s[j] += w * v;
+            q[j] += w * v * v;
         }
-    for (long i = m; i < n / step; i++) {
-        double t = (double)v[i * step] - pivot;
-        double w = fabs(t - centre) <= reach ? 1 : 0;
-        c[0] += w;
-        s[0] += w * t;
-        q[0] += w * t * t;
-    }
     out[0] = out[1] = out[2] = 0;
     for (int j = 0; j < LANES; j++) {
         out[0] += c[j];
@@ -53,14 +43,25 @@ WIDE static void clipped_sums(const float *v, long n, long step, double pivot, d
     }
 }
 
-/* Centre (minus pivot) and rms of a sample by 2-sigma clipping until it stands still. */
-static void rough(const float *v, long n, double pivot, double *centre, double *sigma)
+/*
+ * Centre (minus pivot) and rms of a regular sample by 2-sigma clipping until it
+ * stands still; *whole = 1 when the sample has whole numbers below 2^23 only.
+ */
+static void rough(const float *v, long n, double pivot, double *centre, double *sigma, int *whole)
 {
-    long step = n / SAMPLE > 0 ? n / SAMPLE : 1;
-    double c = 0, reach = INFINITY, s = 0;
+    double t[SAMPLE + LANES], c = 0, reach = INFINITY, s = 0;
+    long m = n < SAMPLE ? n : SAMPLE;
+    *whole = 1;
+    for (long i = 0; i < m; i++) {
+        float p = v[(size_t)i * (size_t)n / (size_t)m];
+        t[i] = (double)p - pivot;
+        *whole &= fabsf(p) < 8388608.0f && (float)(int)p == p;
+    }
+    for (long i = 0; m % LANES; i++)       /* repeat a few */
+        t[m++] = t[i];
     for (int pass = 0; pass < 30; pass++) {
         double sum[3];
-        clipped_sums(v, n, step, pivot, c, reach, sum);
+        clipped_sums(t, m, c, reach, sum);
         if (!(sum[0] > 0))
             break;
         double mean = sum[1] / sum[0], var = sum[2] / sum[0] - mean * mean;
@@ -77,29 +78,34 @@ static void rough(const float *v, long n, double pivot, double *centre, double *
     *sigma = s;
 }
 
-/* 1 when every value is a whole number below 2^23. */
-WIDE static int whole(const float *v, long n)
+/* Bin of every value, 0 below and BINS + 1 above the range. */
+WIDE static void bins_of(const float *restrict v, long n, float lo, float scale, int32_t *restrict bin)
 {
-    int odd = 0;
-    for (long i = 0; i < n; i++)
-        odd |= !(fabsf(v[i]) < 8388608.0f) || (float)(int)v[i] != v[i];
-    return !odd;
+    for (long i = 0; i < n; i++) {
+        float t = (v[i] - lo) * scale + 1;
+        t = t > 0 ? t : 0;
+        t = t < BINS + 1 ? t : BINS + 1;
+        bin[i] = (int32_t)t;
+    }
 }
 
-static void histogram_fill(struct histogram *h, const float *v, long n, double centre, double sigma)
+static void histogram_fill(struct histogram *h, const float *v, long n, double centre, double sigma, int whole)
 {
+    enum { PIECE = 1024 };
+    int32_t bin[PIECE];
     h->width = 10 * sigma / BINS;
-    h->lo = centre - 5 * sigma;
-    if (sigma < 1e5 && whole(v, n)) {
+    h->lo = (double)(float)(centre - 5 * sigma);
+    if (whole && sigma < 1e5) {
         h->width = ceil(h->width);
         h->lo = floor(centre - h->width * BINS / 2) + 0.5;
     }
-    memset(h->count, 0, sizeof h->count);
-    double scale = 1 / h->width, lo = h->lo;
-    for (long i = 0; i < n; i++) {
-        double t = ((double)v[i] - lo) * scale;
-        if (t >= 0 && t < BINS)
-            h->count[(int)t]++;
+    memset(h->tally, 0, sizeof h->tally);
+    h->count = h->tally + 1;
+    for (long i = 0; i < n; i += PIECE) {
+        long m = n - i < PIECE ? n - i : PIECE;
+        bins_of(v + i, m, (float)h->lo, (float)(1 / h->width), bin);
+        for (long k = 0; k < m; k++)
+            h->tally[bin[k]]++;
     }
     int64_t s0 = 0, s1 = 0, s2 = 0;
     for (int b = 0; b < BINS; b++) {
@@ -150,14 +156,15 @@ static int clamp_bin(double b)
 void background_clip(const float *v, long n, double gain, double *level, double *sigma)
 {
     double pivot = (double)v[n / 2], centre, s;
-    rough(v, n, pivot, &centre, &s);
+    int whole;
+    rough(v, n, pivot, &centre, &s, &whole);
     centre += pivot;
     *level = centre;
     *sigma = 0;
     if (!(s > 8 * DBL_EPSILON * fabs(centre)))
         return;
     struct histogram h;
-    histogram_fill(&h, v, n, centre, s);
+    histogram_fill(&h, v, n, centre, s, whole);
 
     int lo = 0, hi = BINS;
     double mean = 0, median = 0, rms = 0;
@@ -234,6 +241,14 @@ struct cells {
     double *level, *sigma;         /* my*mx; NaN: no use */
 };
 
+WIDE static int all_finite(const float *v, long n)
+{
+    int32_t bad = 0;
+    for (int i = 0; i < (int)n; i++)
+        bad |= !(fabsf(v[i]) <= FLT_MAX);
+    return !bad;
+}
+
 /* Copy the good pixels of one cell; returns how many. */
 static long gather(const struct cells *c, long x0, long x1, long y0, long y1, float *buf)
 {
@@ -241,10 +256,7 @@ static long gather(const struct cells *c, long x0, long x1, long y0, long y1, fl
     for (long y = y0; y < y1; y++) {
         const float *pix = c->im->pix + (size_t)y * (size_t)c->im->nx;
         const float *rms = c->rms_map ? c->rms_map + (size_t)y * (size_t)c->im->nx : NULL;
-        long bad = 0;
-        for (long x = x0; x < x1; x++)
-            bad += !(fabsf(pix[x]) <= FLT_MAX) || (rms && !(rms[x] <= FLT_MAX));
-        if (!bad) {
+        if (all_finite(pix + x0, x1 - x0) && (!rms || all_finite(rms + x0, x1 - x0))) {
             memcpy(buf + n, pix + x0, (size_t)(x1 - x0) * sizeof *buf);
             n += x1 - x0;
             continue;
@@ -385,7 +397,7 @@ static int mesh_new(struct mesh *m, const struct image *im, long mx, long my, co
         natural(dx + i, my, mx, dxy + i, w);
     }
     free(w);
-    *m = (struct mesh){im->nx, im->ny, mx, my, pivot, node};
+    *m = (struct mesh){im->nx, im->ny, mx, my, pivot, node, NULL};
     return OK;
 }
 
@@ -422,6 +434,35 @@ static void column_at(const struct mesh *m, long k, double t, double v[2])
     }
 }
 
+/* The same from the table of rows, or made here when there is none. */
+static void column_of_row(const struct mesh *m, long k, long y, double v[2])
+{
+    if (m->row) {
+        const float *f = m->row + 2 * ((size_t)y * (size_t)m->mx + (size_t)k);
+        v[0] = (double)f[0];
+        v[1] = (double)f[1];
+    } else {
+        column_at(m, k, ((double)y + 0.5) * (double)m->my / (double)m->ny - 0.5, v);
+    }
+}
+
+/* Fill the table of rows. */
+static int mesh_rows(struct mesh *m)
+{
+    float *row = malloc(2 * (size_t)m->ny * (size_t)m->mx * sizeof *row);
+    if (!row)
+        return E_NOMEM;
+    for (long y = 0; y < m->ny; y++)
+        for (long k = 0; k < m->mx; k++) {
+            double v[2];
+            column_of_row(m, k, y, v);
+            row[2 * (y * m->mx + k)] = (float)v[0];
+            row[2 * (y * m->mx + k) + 1] = (float)v[1];
+        }
+    m->row = row;
+    return OK;
+}
+
 /* out[i] = cubic at t0 + (first + i) dt; the same bits wherever a piece begins. */
 WIDE static void polynomial(float t0, float dt, const float c[4], int first, int n, float *restrict out)
 {
@@ -440,12 +481,11 @@ static long first_pixel(const struct mesh *m, long k)
 
 void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
 {
-    double ty = ((double)y + 0.5) * (double)m->my / (double)m->ny - 0.5;
     double h = (double)m->mx / (double)m->nx;
     long x = x0, end = x0 + n;
     if (m->mx == 1) {
         double v[2];
-        column_at(m, 0, ty, v);
+        column_of_row(m, 0, y, v);
         for (long i = 0; i < n; i++)
             out[i] = (float)v[0];
         return;
@@ -457,8 +497,8 @@ void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
         long i = k < 0 ? 0 : k > m->mx - 2 ? m->mx - 2 : k;
         long stop = k == m->mx - 1 ? end : first_pixel(m, k + 1);
         stop = stop > end ? end : stop <= x ? x + 1 : stop;
-        column_at(m, i, ty, v0);
-        column_at(m, i + 1, ty, v1);
+        column_of_row(m, i, y, v0);
+        column_of_row(m, i + 1, y, v1);
         cubic(v0[0], v1[0], v0[1], v1[1], c);
         if (k < 0)
             c[2] = c[3] = 0;
@@ -534,6 +574,8 @@ static int finish(struct background *b, struct cells *c)
     }
     if (!st)
         st = mesh_new(&out.rms, c->im, c->mx, c->my, sigma, (double)(float)out.mean_rms);
+    if (!st)
+        st = mesh_rows(&out.level);
     free(level);
     if (st)
         background_free(&out);
@@ -571,6 +613,7 @@ int background_measure(struct background *b, const struct image *im, const float
 void background_free(struct background *b)
 {
     free(b->level.node);
+    free(b->level.row);
     free(b->rms.node);
     *b = (struct background){0};
 }

@@ -19,6 +19,7 @@ struct mesh {
     long nx, ny, mx, my;
     double pivot;          /* subtracted from the nodes, exact in float32 */
     double *node;          /* my*mx values minus pivot, owned; then the three derivative tables */
+    float *row;            /* ny*mx pairs: value and second derivative along x in every pixel row; or NULL */
 };
 
 struct background {

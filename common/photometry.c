@@ -283,9 +283,12 @@ static int sort_rings(struct photometry_work *w, double reach, long *nring)
     if (st)
         return st;
     memset(w->start, 0, ((size_t)rings + 2) * sizeof *w->start);
+    double far = (double)rings;
+    long x0 = s->cx > far ? (long)(s->cx - far) : 0, x1 = s->cx + far + 1 < (double)s->nx ? (long)(s->cx + far) + 1 : s->nx;
+    long y0 = s->cy > far ? (long)(s->cy - far) : 0, y1 = s->cy + far + 1 < (double)s->ny ? (long)(s->cy + far) + 1 : s->ny;
     for (int pass = 0; pass < 2; pass++) {
-        for (long y = 0; y < s->ny; y++)
-            for (long x = 0; x < s->nx; x++) {
+        for (long y = y0; y < y1; y++)
+            for (long x = x0; x < x1; x++) {
                 double dx = (double)x - s->cx, dy = (double)y - s->cy, r2 = dx * dx + dy * dy;
                 if (!(r2 < (double)rings * (double)rings))
                     continue;
@@ -315,45 +318,74 @@ static double growth(const struct photometry_work *w, long nring, double r, long
     return sum;
 }
 
-/* Smallest radius that holds `flux`, within `reach`; reach when none does. */
-static int half_light(struct photometry_work *w, double reach, double flux, double *radius)
+/* Radius that holds `flux`, within `reach`; reach when none does. *found: it lies well inside. */
+static int radius_within(struct photometry_work *w, double reach, double flux, int *found, double *radius)
 {
-    long nring, from = 0;
+    long nring, k = 0;
     int st = sort_rings(w, reach, &nring);
     if (st)
         return st;
-    double inner = 0, lo = 0, f_lo = 0, hi = 0, f_hi = 0;
-    while (hi < reach) {
+    double sum = 0, ring = 0;
+    for (; k < nring; k++) {                   /* the ring of pixel centres in which the sum passes `flux` */
+        ring = 0;
+        for (long i = w->start[k]; i < w->start[k + 1]; i++)
+            ring += (double)w->ring[i].v;
+        if (sum + ring >= flux)
+            break;
+        sum += ring;
+    }
+    *found = k + 3 < nring;
+    double guess = k < nring ? sqrt((double)(k * k) + (2.0 * (double)k + 1) * (flux - sum) / ring) : reach;
+    long from = (long)(guess - 2.75) > 0 ? (long)(guess - 2.75) : 0;
+    double inner = 0;
+    for (long i = 0; i < w->start[from]; i++)
+        inner += (double)w->ring[i].v;
+    /* bracket, then false position in r^2 with the Illinois rule */
+    double lo = guess > 1 ? guess - 1 : 0, hi = guess + 1;
+    double f_lo = growth(w, nring, lo, from, inner) - flux, f_hi = growth(w, nring, hi, from, inner) - flux;
+    while (f_hi < 0 && hi < reach) {
         lo = hi;
         f_lo = f_hi;
-        hi = lo + 1 < reach ? lo + 1 : reach;
-        while ((double)from + 1 + 0.75 < lo) {
-            for (long i = w->start[from]; i < w->start[from + 1]; i++)
-                inner += (double)w->ring[i].v;
-            from++;
-        }
-        f_hi = growth(w, nring, hi, from, inner);
-        if (f_hi >= flux)
-            break;
+        hi += 1;
+        f_hi = growth(w, nring, hi, from, inner) - flux;
     }
-    if (!(f_hi >= flux)) {
-        *radius = reach;
+    if (f_lo >= 0 && lo > 0) {                 /* the guess was above: start from the centre */
+        lo = 0;
+        from = 0;
+        inner = 0;
+        f_lo = -flux;
+    }
+    *radius = hi < reach ? hi : reach;
+    if (f_hi < 0)
         return OK;
-    }
-    for (int i = 0; i < 40 && hi - lo > 1e-4 * hi; i++) {
-        double t = (flux - f_lo) / (f_hi - f_lo);      /* regula falsi in area, kept off the ends */
-        t = t > 0.05 ? t < 0.95 ? t : 0.95 : 0.05;
-        double r = sqrt(lo * lo + t * (hi * hi - lo * lo)), here = growth(w, nring, r, from, inner);
-        if (here >= flux) {
+    int last = 0;
+    for (int i = 0; i < 40 && hi - lo > 2e-4 * hi; i++) {
+        double r = sqrt(lo * lo - f_lo / (f_hi - f_lo) * (hi * hi - lo * lo));
+        double here = growth(w, nring, r, from, inner) - flux;
+        *radius = r;
+        if (fabs(here) < 1e-4 * flux)
+            break;
+        if (here >= 0) {
             hi = r;
             f_hi = here;
+            f_lo *= last == 1 ? 0.5 : 1;
+            last = 1;
         } else {
             lo = r;
             f_lo = here;
+            f_hi *= last == -1 ? 0.5 : 1;
+            last = -1;
         }
     }
-    *radius = hi;
+    *radius = *radius < reach ? *radius : reach;
     return OK;
+}
+
+/* The same, looking at the inner pixels first. */
+static int half_light(struct photometry_work *w, double near, double reach, double flux, double *radius)
+{
+    int found = 0, st = near < reach ? radius_within(w, near, flux, &found, radius) : OK;
+    return st || found ? st : radius_within(w, reach, flux, &found, radius);
 }
 
 /* ---- the Gaussian core ---- */
@@ -561,7 +593,7 @@ static int measure_sizes(const struct field *f, struct photometry_work *w, struc
     o->ywin = o->y;
     int st = OK;
     if (o->flux_auto > 0)
-        st = half_light(w, o->kron_radius * o->a, f->p->flux_fraction * o->flux_auto, &o->flux_radius);
+        st = half_light(w, 2 * o->a + 3, o->kron_radius * o->a, f->p->flux_fraction * o->flux_auto, &o->flux_radius);
     if (!st)
         st = grow(&w->line, &w->cap_line, (size_t)s->nx, sizeof *w->line);
     if (st)
