@@ -419,7 +419,6 @@ static void weighted_sums(const struct stamp *s, double cx, double cy, double w2
 
 struct core {
     double variance;                       /* per axis, pixel^2 */
-    double sum, norm;                      /* sum I W, sum W^2: S/N = sum / (rms sqrt(norm)) */
 };
 
 /*
@@ -439,7 +438,7 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
         double next = m < 0.9 * w2 ? m * w2 / (w2 - m) : 10 * w2;
         next = next > 0.25 * w2 ? next < 4 * w2 ? next : 4 * w2 : 0.25 * w2;
         if (fabs(next - w2) < 1e-3 * w2)
-            return (struct core){next, t[0], t[2]};
+            return (struct core){next};
         w2 = next;
         if (!(w2 > 0.09 && w2 < most))
             break;
@@ -472,24 +471,45 @@ static void window_centroid(const struct stamp *s, double sigma, double *line, d
     }
 }
 
-/*
- * Point source or not, from ln T, T the variance of the fitted Gaussian.
- * Stars: normal about ln T0 with sigma^2 = (2/snr)^2 + 0.06^2, T0 = (FWHM/2.355)^2
- * + 1/12 (the pixel); 2/snr is the error of ln T for the matched Gaussian in
- * white noise.  Galaxies: a density of 0.35 per unit of ln T from T0 upwards,
- * smoothed by the same error.  One star is expected among 30 objects of equal
- * size where the error is large, one in 2 where it vanishes.
- */
-double star_probability(double variance, double snr, double psf_fwhm)
+/* Variance of the PSF with its pixel if both were Gaussian, pixel^2. */
+static double point_variance(double psf_fwhm)
 {
-    if (!(psf_fwhm > 0 && variance > 0 && snr > 0))
+    double sigma = psf_fwhm / FWHM_SIGMA;
+    return sigma * sigma + 1 / 12.0;
+}
+
+/*
+ * Measured on simulated stars and galaxies of 0.04, 0.10 and 0.16" (obscured
+ * 2 m pupil, FWHM 0.123"): ln of the ratio is 0.24, 0.30, 0.30 for stars (0 for
+ * a Gaussian PSF, wings add the rest) with a phase scatter of 0.005, 0.034,
+ * 0.15; 0.92 +- 0.24 for galaxies.
+ */
+double star_probability(double log_ratio, double snr, double psf_fwhm)
+{
+    if (!(psf_fwhm > 0))
         return 0.5;
-    double sigma = psf_fwhm / FWHM_SIGMA, t0 = sigma * sigma + 1 / 12.0;
-    double error2 = 4 / (snr * snr) + 0.06 * 0.06, z = log(variance / t0) / sqrt(error2);
-    double star = exp(-0.5 * z * z) / sqrt(2 * acos(-1) * error2);
-    double galaxy = 0.35 * 0.5 * erfc(-z / sqrt(2)) + 1e-12;
-    double prior = 1 / (1 + 900 / (snr * snr));
-    return prior * star / (prior * star + galaxy);
+    if (!(snr > 0))
+        return 0;
+    double noise2 = 4 / (snr * snr), phase = 0.15 * exp(-(point_variance(psf_fwhm) - 0.19) / 0.1);
+    double star2 = 0.09 * 0.09 + phase * phase + noise2, galaxy2 = 0.24 * 0.24 + noise2;
+    double star = exp(-0.5 * (log_ratio - 0.22) * (log_ratio - 0.22) / star2) / sqrt(star2);
+    double galaxy = exp(-0.5 * (log_ratio - 0.92) * (log_ratio - 0.92) / galaxy2) / sqrt(galaxy2);
+    double odds = 1 / (1 + 225 / (snr * snr));
+    return odds * star / (odds * star + galaxy + 1e-30);
+}
+
+/* ln of the weighted second moment over that of a Gaussian of the PSF's width, and its S/N. */
+static double measure_star(const struct field *f, const struct stamp *s, double rms, double *line)
+{
+    if (!(f->p->psf_fwhm > 0))
+        return 0.5;
+    double t0 = point_variance(f->p->psf_fwhm), w2 = 2.4 * t0 + 0.5, t[5], cx = s->cx, cy = s->cy;
+    window_centroid(s, sqrt(w2), line, &cx, &cy);
+    weighted_sums(s, cx, cy, w2, line, t);
+    if (!(t[0] > 0 && t[1] > 0))
+        return 0;
+    double ratio = 0.5 * t[1] / t[0] * (t0 + w2) / (t0 * w2);
+    return star_probability(log(ratio), t[0] / (rms * sqrt(t[2])), f->p->psf_fwhm);
 }
 
 /* ---- all together ---- */
@@ -588,7 +608,6 @@ static int measure_sizes(const struct field *f, struct photometry_work *w, struc
     const struct stamp *s = &w->stamp;
     o->flux_radius = sqrt(o->a * o->b);
     o->fwhm = FWHM_SIGMA * sqrt(0.5 * (o->xx + o->yy));
-    o->star_prob = 0;
     o->xwin = o->x;
     o->ywin = o->y;
     int st = OK;
@@ -600,14 +619,9 @@ static int measure_sizes(const struct field *f, struct photometry_work *w, struc
         return st;
     double *line = w->line;
     struct core c = fit_core(s, s->cx, s->cy, 0.25 * (o->xx + o->yy), line);
-    if (c.variance > 0) {
+    if (c.variance > 0)
         o->fwhm = FWHM_SIGMA * sqrt(c.variance);
-        double noise2 = o->rms * o->rms * c.norm;
-        double snr = noise2 > 0 ? c.sum / sqrt(noise2) : INFINITY;
-        o->star_prob = star_probability(c.variance, snr, f->p->psf_fwhm);
-    } else if (!(f->p->psf_fwhm > 0)) {
-        o->star_prob = 0.5;
-    }
+    o->star_prob = measure_star(f, s, f->p->rms_map ? o->rms : f->p->noise, line);
     if (f->p->windowed) {
         double cx = s->cx, cy = s->cy;
         window_centroid(s, 2 * o->flux_radius / FWHM_SIGMA, line, &cx, &cy);

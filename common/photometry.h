@@ -74,9 +74,14 @@ MUST_CHECK int photometry_measure(const struct field *f, const struct blob *blob
 double circle_overlap(double dx, double dy, double r);
 
 /*
- * Probability that an object is a point source, see photometry.c: variance is
- * that of the fitted Gaussian (pixel^2), snr that of its flux.
+ * Probability that an object is a point source.  log_ratio: ln of its second
+ * moment under a Gaussian weight of variance w2 = 2.4 T0 + 0.5 pixel^2 about the
+ * windowed centroid, over T0 w2 / (T0 + w2), what a Gaussian of the PSF's
+ * variance T0 = (psf_fwhm/2.355)^2 + 1/12 pixel^2 would have; snr: that of the
+ * weighted flux; psf_fwhm in pixels.  Both kinds are normal in log_ratio, stars
+ * (0.22, 0.09 and a term for undersampling), galaxies (0.92, 0.24), each
+ * widened by 2/snr; stars are rarer by 1 + (15/snr)^2.  0.5 when psf_fwhm is 0.
  */
-double star_probability(double variance, double snr, double psf_fwhm);
+double star_probability(double log_ratio, double snr, double psf_fwhm);
 
 #endif

@@ -166,13 +166,33 @@ static void bad_pixels(void)
 
 static void stars(void)
 {
-    double t0 = pow(1.5 / 2.3548, 2) + 1 / 12.0;
-    check_that(star_probability(t0, 20, 1.5) > 0.7 && star_probability(t0, 50, 1.5) > 0.9 && star_probability(t0, 1000, 1.5) > 0.9,
-               "a PSF-sized object: %.3f at S/N 20, %.3f at 50, %.3f at 1000", star_probability(t0, 20, 1.5),
-               star_probability(t0, 50, 1.5), star_probability(t0, 1000, 1.5));
-    check_that(star_probability(1.7 * t0, 30, 1.5) < 0.1 && star_probability(0.5 * t0, 100, 1.5) < 0.1,
-               "1.7 times the PSF's variance is no star, nor is a cosmic ray");
-    check_that(star_probability(t0, 20, 0) == 0.5, "without a PSF 0.5");
+    check_that(star_probability(0.25, 25, 1.2) > 0.9 && star_probability(0.25, 1000, 1.2) > 0.95 && star_probability(0, 100, 1.2) > 0.9,
+               "a PSF-sized object: %.3f at S/N 25, %.3f at 1000; a Gaussian one %.3f", star_probability(0.25, 25, 1.2),
+               star_probability(0.25, 1000, 1.2), star_probability(0, 100, 1.2));
+    check_that(star_probability(0.7, 30, 1.2) < 0.1 && star_probability(-1.5, 100, 1.2) < 0.1,
+               "twice the PSF's second moment is no star, nor is a cosmic ray");
+    check_that(star_probability(0.3, 20, 0) == 0.5, "without a PSF 0.5");
+    /* on images: a Gaussian star and a galaxy of three times its variance, pixel phases of a whole pixel */
+    struct image im = {0};
+    struct detection d = {0};
+    struct detect_params p = DETECT_DEFAULTS;
+    p.phot.psf_fwhm = 2;
+    double t0 = pow(2 / 2.3548200450309493, 2) + 1 / 12.0, low = 1, high = 0;
+    for (int k = 0; k < 9; k++) {
+        if (image_new(&im, SIDE, SIDE))
+            return;
+        add_gauss(&im, 50 + k / 3 / 3.0, 50 + k % 3 / 3.0, 1e4, sqrt(t0), sqrt(t0), 0);
+        add_gauss(&im, 110 + k / 3 / 3.0, 100 + k % 3 / 3.0, 1e4, sqrt(3 * t0), sqrt(3 * t0), 0);
+        p.phot.gain = 0;
+        if (run(&im, NULL, &p, &d) || d.n != 2)
+            break;
+        int first = d.object[0].x < 80;
+        low = fmin(low, d.object[!first].star_prob);
+        high = fmax(high, d.object[first].star_prob);
+        detection_free(&d);
+        image_free(&im);
+    }
+    check_that(low > 0.9 && high < 0.1, "images of stars and galaxies: at least %.3f, at most %.3g", low, high);
 }
 
 /* 1e20 and 1e-20 give the same objects; noise images give finite rows. */
