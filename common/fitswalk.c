@@ -14,13 +14,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CARD = 80, MOST_AXES = 999 };
+/* The last two bound what a small file, inflated, can make us hold; surveys stay far below. */
+enum { CARD = 80, MOST_AXES = 999, MOST_HDUS = 4096, MOST_CARDS = 200000 };
 
 /* What the messages need: which file, which HDU. */
 struct walk {
     struct source *s;
     struct err *e;
     int hdu;
+    size_t cards;          /* of the HDUs before */
 };
 
 __attribute__((format(printf, 2, 3)))
@@ -68,9 +70,14 @@ int fits_card_integer(const char *card, int64_t *value)
 
 static int is_card(const char *card, const char *name)
 {
-    char padded[9];
-    snprintf(padded, sizeof padded, "%-8s", name);
-    return !memcmp(card, padded, 8);
+    int i = 0;
+    while (i < 8 && name[i] && card[i] == name[i])
+        i++;
+    if (name[i] && i < 8)
+        return 0;
+    while (i < 8 && card[i] == ' ')
+        i++;
+    return i == 8;
 }
 
 /* Index of NAMEn in 1.., 0 when the card is not one. */
@@ -145,6 +152,8 @@ static int read_cards(const struct walk *w, uint64_t at, struct fits_unit *u)
             memcpy(card, c, CARD);
             card[CARD] = 0;
             size_t blank = strspn(card, " ");
+            if (w->cards + u->cards.n >= MOST_CARDS)
+                return broken(w, "more than %d header cards", MOST_CARDS);
             if (ended) {
                 if (blank != CARD)
                     return broken(w, "text after the END card");
@@ -399,6 +408,10 @@ int fits_walk(struct source *s, struct fits_unit **unit, int *n, struct err *e)
     if (st == OK)
         st = first_bytes(s, have, e);
     while (st == OK && more) {
+        if (w.hdu == MOST_HDUS) {
+            st = broken(&w, "more than %d HDUs", MOST_HDUS);
+            break;
+        }
         if (w.hdu == cap) {
             cap = cap ? 2 * cap : 4;
             void *p = realloc(list, (size_t)cap * sizeof *list);
@@ -410,6 +423,7 @@ int fits_walk(struct source *s, struct fits_unit **unit, int *n, struct err *e)
         }
         list[w.hdu] = (struct fits_unit){0};
         st = walk_unit(&w, at, &list[w.hdu], &at);
+        w.cards += list[w.hdu].cards.n;
         w.hdu++;
         if (st == OK)
             st = another(&w, at, &more);

@@ -37,7 +37,8 @@ struct fits_unit {
  * E_DATA with the cause for anything the standard forbids: mandatory cards
  * missing, repeated or out of order, sizes that overflow or that the file does
  * not have, characters that are not printable ASCII, bytes after the last HDU
- * that are neither padding nor whole special records.
+ * that are neither padding nor whole special records; more than 4096 HDUs or
+ * 200000 cards (a small gzip file could hold millions).
  */
 MUST_CHECK int fits_walk(struct source *s, struct fits_unit **unit, int *n, struct err *e);
 void fits_walk_free(struct fits_unit *unit, int n);

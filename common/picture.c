@@ -30,6 +30,25 @@ static double select_nth(float *v, size_t n, size_t k)
     return (double)v[k];
 }
 
+static double stretched(enum stretch kind, double x)
+{
+    return kind == STRETCH_LINEAR ? x : kind == STRETCH_LOG ? log1p(x) : asinh(x);
+}
+
+static double relaxed(enum stretch kind, double f)
+{
+    return kind == STRETCH_LINEAR ? f : kind == STRETCH_LOG ? expm1(f) : sinh(f);
+}
+
+/* Shade k begins where 255 f / f(top) = k - 1/2, so that a pixel costs eight comparisons and no asinh. */
+static void set_edges(struct picture *p)
+{
+    double top = stretched(p->stretch, (p->high - p->low) / p->soft);
+    p->edge[0] = -INFINITY;
+    for (int k = 1; k < 256; k++)
+        p->edge[k] = p->low + p->soft * relaxed(p->stretch, top * (k - 0.5) / 255);
+}
+
 int picture_levels(struct picture *p, float *sample, size_t n)
 {
     size_t good = 0;
@@ -55,25 +74,18 @@ int picture_levels(struct picture *p, float *sample, size_t n)
     p->low = low;
     p->high = high;
     p->soft = fmax(2 * sigma, (high - low) / 3000);
+    set_edges(p);
     return OK;
-}
-
-static double shade(enum stretch kind, double x)
-{
-    return kind == STRETCH_LINEAR ? x : kind == STRETCH_LOG ? log1p(fmax(x, 0)) : asinh(x);
 }
 
 void picture_row(const struct picture *p, const float *v, size_t n, unsigned char *grey, unsigned char *alpha)
 {
-    double top = shade(p->stretch, (p->high - p->low) / p->soft);
     for (size_t i = 0; i < n; i++) {
-        double g = 128;
-        int good = isfinite(v[i]);
-        if (good) {
-            double x = fmin(fmax((double)v[i], p->low), p->high);
-            g = floor(255 * shade(p->stretch, (x - p->low) / p->soft) / top + 0.5);
-        }
-        grey[i] = (unsigned char)g;
+        double x = (double)v[i];
+        int k = 0, good = isfinite(v[i]);
+        for (int step = 128; step; step /= 2)
+            k += x >= p->edge[k + step] ? step : 0;
+        grey[i] = (unsigned char)(good ? k : 128);
         if (alpha)
             alpha[i] = good ? 255 : 0;
     }

@@ -17,6 +17,7 @@ struct picture {
     enum stretch stretch;
     double low, high;      /* values shown black and white, low < high */
     double soft;           /* s, > 0: asinh and log are linear well below it */
+    double edge[256];      /* smallest value of each shade; edge[0] is not used */
 };
 
 /*
@@ -25,7 +26,7 @@ struct picture {
  *   low = m - 2 sigma, soft = 2 sigma, high = the 99.9th percentile, at least m + 5 sigma,
  * and soft at least (high - low) / 3000.  Without any finite value, or when all
  * are the same, everything is mid-grey or darker.  low and high that are not NaN
- * on entry stay as they are. E_RANGE when low >= high then.
+ * on entry stay as they are. E_RANGE when low >= high then.  Fills all but stretch.
  */
 MUST_CHECK int picture_levels(struct picture *p, float *sample, size_t n);
 

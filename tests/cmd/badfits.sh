@@ -152,8 +152,11 @@ primary | gzip -n | head -c 10 | try F "gzip, only its header"
 { primary | gzip -n; echo junk; } | try F "gzip with junk behind"
 { printf '\037\213'; head -c 5000 /dev/urandom; } | try F "garbage that begins like gzip"
 primary | gzip -n | gzip -n | try F "gzip in gzip"
-head -c 200000000 /dev/zero | gzip -1n | try F "200 MB of zeros in gzip"
+head -c 100000000 /dev/zero | gzip -1n | try F "100 MB of zeros in gzip"
 { cards "$S" "$B" "$N" 'NAXIS1  = 65535' 'NAXIS2  = 65535' $E; head -c 1000 /dev/zero; } | gzip -n | try F "8 GB announced in gzip"
+{ cards "$S" "$B" 'NAXIS   =                    0'; head -c 60000000 /dev/zero | tr '\0' ' '; } | gzip -1n | try F "60 MB of blank cards in gzip"
+{ empty; cards "$XT" 'BITPIX  = 8' 'NAXIS   = 0' "$P" "$G" $E >x; for ((i = 0; i < 12; i++)); do cat x x >y; mv y x; done; cat x x x; } | gzip -1n | try F "12000 HDUs in gzip"
+{ empty; cards "$XT" 'BITPIX  = 8' 'NAXIS   = 0' "$P" "$G" $E >x; for ((i = 0; i < 11; i++)); do cat x x >y; mv y x; done; cat x; cards "$XT" "$B" "$N" "$X" "$Y" "$P" "$G" $E; data 1200; } | try W "an image behind 2048 HDUs"
 
 # ---- tables
 { table 12 5 0 'TFIELDS = 2' "TTYPE1  = 'ID'" "TFORM1  = 'J'" "TTYPE2  = 'NAME'" "TFORM2  = '8A'"; data 60; } | try W "a table" -t
