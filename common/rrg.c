@@ -134,7 +134,7 @@ void rrg_correct(const struct moments *m, const struct rrg_psf *psf, const struc
                  struct rrg *out)
 {
     struct rrg r = {.flags = m->flags};
-    double raw = m->m2[0] + m->m2[2], p[3], round[3];
+    double raw = m->m2[0] + m->m2[2], p[3], round[3], left[3] = {0};
     r.d = raw >= 0 ? sqrt(0.5 * raw) : NAN;
     r.d_err = spread(m->cov[0] + m->cov[5] + 2 * m->cov[2]) / (4 * r.d);
     if (rrg_psf_free(psf, opt->first, p) != OK)
@@ -144,15 +144,10 @@ void rrg_correct(const struct moments *m, const struct rrg_psf *psf, const struc
     r.weff = sqrt(w2 + g2);
     double s = w2 / (w2 + g2), gw2 = g2 * s;
     round_off(m->m2, m->m4, w2, p, round);
-    if (!opt->first) {
-        double left[3];
+    if (!opt->first)
         star_residual(psf, p, left);
-        for (int k = 0; k < 3; k++)
-            round[k] -= left[k];
-    }
-    r.m2[0] = (round[0] - gw2) / (s * s);
-    r.m2[1] = round[1] / (s * s);
-    r.m2[2] = (round[2] - gw2) / (s * s);
+    for (int k = 0; k < 3; k++)
+        r.m2[k] = (round[k] - left[k] - (k == 1 ? 0 : gw2)) / (s * s);
     for (int k = 0; k < 4; k++)
         r.m3[k] = m->m3[k] / (s * s * s);
     if (opt->plain)
