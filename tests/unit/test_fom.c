@@ -47,12 +47,12 @@ static const struct fom_options standard = {.radius = 0.15, .draws = 50, .seed =
 static struct fom_result measure(const struct world *w, double scale, int fields, const struct fom_options *o)
 {
     struct fom_image im[27];
-    const struct fom_image *p[27];
+    const struct fom_image *p[27] = {0};
     struct fom_result r = {{0}, 0, 0, 0, 0, {0}};
     size_t n = 0;
     for (int f = 0; f < fields; f++)
         for (int k = 0; k < 9; k++, n++) {
-            char name[8];
+            char name[16];
             snprintf(name, sizeof name, "f%d", f);
             im[n] = image(w, shears[k], scale, name, (uint64_t)f);
             p[n] = &im[n];
