@@ -4,8 +4,8 @@
  * Stars are points, shapelets themselves.  A Gaussian is a shapelet of order 0
  * with beta = RE / sqrt(2 ln 2).  A Sersic profile exp(-b (r/RE)^(1/n)), n >= 1/2, is
  * exactly a mixture of Gaussians (a completely monotone function of
- * r^2), here summed at 20 to 220 widths: error of the flux in any ring below 3e-4, 6e-5 from n = 0.51 on (tests/unit/test_render.c);
- * 0.5 <= n < 0.5025 is drawn as a Gaussian (1e-3).
+ * r^2), here summed at 20 to 220 widths: error of the flux in any ring below 1e-3, 1e-4 from n = 0.52 on (tests/unit/test_render.c);
+ * 0.5 <= n < 0.5025 is drawn as a Gaussian.
  * Axis ratio and position angle are a shear of the round profile.
  */
 #ifndef PIXSHEAR_EMIT_H

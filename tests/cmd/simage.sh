@@ -130,3 +130,30 @@ $F make pixel.fits 21 21 'exp(-(($x-10)**2+($y-10)**2)/20)' "PIXELSCL=          
 fails "a pixel twice" 1 simage one.txt -x 0.1 --size 5,5 -p pixel.fits --psf-normalise -o x.fits
 fails "an unknown type" 1 simage <(printf '# DX DY FLUX TYPE\n0 0 1 blob\n') -x 0.1 --size 5,5 -o x.fits
 [ ! -e x.fits ] && pass "no output after a fault" || fail "output after a fault"
+
+# the independent renderer's truth: shapelets with an exact shear, PSF given as samples
+T=$SHARED/truth/galsim
+if [ -d "$T" ]; then
+    for n in 01 03 05 11; do
+        for x in 0.05 0.10; do
+            for kind in nopsf psf; do
+                gzip -dc "$T/truth_${n}_${kind}_$x.fits.gz" >truth.fits
+                perl -e 'open my $h, "<:raw", "truth.fits" or die; local $/; my $d = <$h>; my %k; my $o = 0;
+                    for (;;) { my $c = substr $d, $o, 80; $o += 80; last if $c =~ /^END /; $k{$1} = $2 if $c =~ /^(\w+)\s*=\s*([-+.0-9eE]+)/ } $o = 2880 * int(($o + 2879) / 2880);
+                    my @v = unpack "d>*", substr $d, $o, 8 * 4096; open my $t, ">", "truth.val"; print $t "$_\n" for @v;
+                    open my $m, ">", "tm.txt"; print $m "# ID BETA NMAX MAG COEFFS\n1 $k{BETA} $k{NMAX} 20"; printf $m " %.17g", $k{"C$_"} for 0 .. ($k{NMAX} + 1) * ($k{NMAX} + 2) / 2 - 1; print $m "\n";
+                    my $g = sqrt($k{GAMMA1} ** 2 + $k{GAMMA2} ** 2); my $f = $g > 0 ? (exp(2 * $g) - 1) / (exp(2 * $g) + 1) / $g : 0;
+                    open my $s, ">", "ts.txt"; printf $s "# DX DY FLUX TYPE MODEL G1 G2\n%.17g %.17g 1 shapelet 1 %.17g %.17g\n", $k{OFFX}, $k{OFFY}, $f * $k{GAMMA1}, $f * $k{GAMMA2}'
+                limit=3e-7 psf=
+                [ $kind = psf ] && limit=1e-6 psf="-p $T/psf_chpsf_0.01.fits.gz --psf-scale 0.01 --psf-cutoff 11.9 --floor 1e-9"
+                simage ts.txt --models tm.txt -x $x --size 64,64 -T 1 --accuracy 1e-7 $psf -q -o t.fits
+                near "truth $n $kind $x\": file, of the peak" "$(perl -e 'open my $h, "<:raw", "t.fits" or die; local $/; my $d = <$h>; my $o = 0;
+                    for (;;) { my $c = substr $d, $o, 80; $o += 80; last if $c =~ /^END /; } $o = 2880 * int(($o + 2879) / 2880);
+                    my @v = unpack "f>*", substr $d, $o, 4 * 4096; open my $t, "<", "truth.val"; my @t = split /\n/, <$t>; my ($m, $p) = (0, 0);
+                    for (0 .. 4095) { my $e = abs($v[$_] - $t[$_]); $m = $e if $e > $m; $p = $t[$_] if $t[$_] > $p } printf "%.3g\n", $m / $p')" 0 $limit
+            done
+        done
+    done
+else
+    skip "truth/galsim is not there"
+fi

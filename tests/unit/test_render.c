@@ -4,12 +4,14 @@
  * paths that make no transform, and objects in strange places.
  */
 #include "check.h"
+#include "emit.h"
 #include "fft.h"
 #include "pupil.h"
 #include "render.h"
 #include "rng.h"
 #include "shapelet.h"
 #include "shear.h"
+#include "tableio.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -94,6 +96,9 @@ static int exact_shape(const struct view *v, const struct emitter *s, double *tm
     shape->a[3] = all[2] * own[1] + all[3] * own[3];
     return st;
 }
+
+static struct image render(const struct view *v, double eps, int n, const struct emitter *s, int threads, struct plan *kept);
+static double sum_of(const struct image *im);
 
 struct result {
     double median, worst, share;   /* of |error| / tolerance; share within the tolerance */
@@ -200,6 +205,113 @@ static void accuracy(const struct otf *t)
                    job[i].psf ? "PSF" : "no PSF", v.pixel, job[i].eps, job[i].floor, r.median, r.worst, 100 * r.share);
         field_free(s, job[i].n);
     }
+}
+
+/* Real galaxies: every model of the HDF catalogue, turned, mirrored, at several magnitudes. */
+static void library(const struct otf *t)
+{
+    static const struct { double pixel, eps, floor; int psf, step; } job[] = {
+        {0.10, 1e-2, 0, 1, 1}, {0.10, 1e-3, 0, 1, 1}, {0.10, 1e-4, 0, 1, 2}, {0.16, 1e-5, 0, 1, 13}, {0.16, 1e-6, 0, 1, 41},
+        {0.10, 1e-7, 0.1, 1, 1}, {0.04, 1e-7, 0.1, 1, 3}, {0.10, 1e-7, 0, 0, 1}, {0.24, 1e-3, 0, 1, 2}};
+    const char *shared = getenv("SHARED");
+    char name[512];
+    struct table list = {0};
+    struct models m = {0};
+    struct err e = {""};
+    snprintf(name, sizeof name, "%s/data/hdf/hdfn_shapelets.txt", shared ? shared : "");
+    if (!shared || table_read(&list, name, 1e9, &e)) {
+        check_skip("data/hdf is not there");
+        return;
+    }
+    if (!check_that(models_open(&m, &list, name, &e) == OK, "HDF models are read"))
+        return;
+    const int n = (int)m.n * 5;
+    struct emitter *all = calloc((size_t)n, sizeof *all), *s = calloc((size_t)n, sizeof *s);
+    for (int i = 0; i < n; i++) {
+        size_t k = (size_t)i % m.n;
+        all[i] = (struct emitter){.x = 150 + uniform(i, 0), .y = 150 + uniform(i, 1), .flux = 2000 * pow(10, 0.4 * (26.65 - 21 - 9 * uniform(i, 2))),
+                                  .coef = m.coef + m.offset[k], .nmax = m.nmax[k], .beta = m.beta[k], .parity = i % 2 ? 1 : -1,
+                                  .rotation = 6.28 * uniform(i, 3), .dilation = 0.6 + 0.8 * uniform(i, 4)};
+        if (i % 9 == 0)
+            all[i].coef = NULL;
+    }
+    for (size_t j = 0; j < sizeof job / sizeof *job; j++) {
+        struct view v = {.nx = 300, .ny = 300, .pixel = job[j].pixel, .diffusion = job[j].psf ? 0.04 : 0,
+                         .psf = job[j].psf ? t : NULL, .g1 = -0.03, .g2 = 0.04};
+        int k = 0;
+        for (int i = 0; i < n; i += job[j].step)
+            s[k++] = all[i];
+        struct result r = requested(&v, job[j].eps, job[j].floor, k, s);
+        check_that(r.share >= 0.99 && r.worst <= 3,
+                   "HDF, %s, %.2f\", accuracy %g, floor %g, %d objects: error / tolerance median %.2g, worst %.2g, %.1f %% within",
+                   job[j].psf ? "PSF" : "no PSF", v.pixel, job[j].eps, job[j].floor, k, r.median, r.worst, 100 * r.share);
+    }
+    free(all);
+    free(s);
+    models_free(&m);
+    table_free(&list);
+}
+
+/* Light of a Sersic profile inside r (RE = 1), P(2n, b r^(1/n)), by its series. */
+static double sersic_inside(double n, double b, double r)
+{
+    const double x = b * pow(r, 1 / n), a = 2 * n;
+    double term = exp(-x + a * log(x) - lgamma(a + 1)), sum = term;
+    for (int k = 1; k < 2000; k++)
+        sum += term *= x / (a + k);
+    return sum;
+}
+
+static void sersic(void)
+{
+    static const double index[] = {0.5, 0.5025, 0.51, 0.6, 0.8, 1, 1.5, 2, 3, 4, 6, 8};
+    struct check k = check_begin("Sersic n = .5 to 8 as Gaussians: light inside 0.05 to 5 RE");
+    for (size_t i = 0; i < sizeof index / sizeof *index; i++) {
+        double sigma[SERSIC_PARTS], flux[SERSIC_PARTS], lo = 1e-3, hi = 20;
+        int parts = sersic_gaussians(index[i], sigma, flux);
+        for (int j = 0; j < 200; j++) {
+            double b = 0.5 * (lo + hi);
+            if (sersic_inside(index[i], b, 1) < 0.5)
+                lo = b;
+            else
+                hi = b;
+        }
+        for (double r = 0.05; r < 5; r *= 1.3) {
+            double sum = 0;
+            for (int j = 0; j < parts; j++)
+                sum += flux[j] * -expm1(-0.5 * r * r / (sigma[j] * sigma[j]));
+            check_close(&k, parts ? sum : NAN, sersic_inside(index[i], lo, r), index[i] < 0.52 ? 1e-3 : 1e-4);
+        }
+    }
+    check_end(&k);
+    double s[SERSIC_PARTS], f[SERSIC_PARTS];
+    check_that(!sersic_gaussians(0.49, s, f) && !sersic_gaussians(8.1, s, f) && !sersic_gaussians(NAN, s, f),
+               "other indices are refused");
+}
+
+/* Every order, scale and shear that makes a sum of pixels checkable, and those that must only end. */
+static void extremes(const struct otf *t)
+{
+    static const double beta[] = {0.001, 0.03, 0.1, 5}, shear[] = {0, -0.0, 5e-324, 0.05, 0.5, 0.99};
+    static const int order[] = {0, 12, 60};
+    struct check k = check_begin("flux for beta 0.01 to 50 pixels, order 0 to 60, g 0 to 0.99");
+    for (int psf = 0; psf < 2; psf++)
+        for (int b = 0; b < 4; b++)
+            for (int n = 0; n < 3; n++)
+                for (int g = 0; g < 6; g++) {
+                    double c[2000] = {0}, m[6];
+                    c[0] = 1 / beta[b];
+                    c[shapelet_index(order[n] / 2, order[n] / 2)] += 0.3 * c[0];
+                    shapelet_moments(order[n], beta[b], c, m);
+                    struct emitter s = {.x = 50, .y = 50.5, .flux = 1000, .coef = c, .nmax = order[n], .parity = 1, .beta = beta[b], .dilation = 1};
+                    struct view v = {.nx = 100, .ny = 100, .pixel = 0.1, .psf = psf ? t : NULL, .g1 = 0.4 * shear[g], .g2 = 0.9 * shear[g]};
+                    struct image im = render(&v, 1e-4, 1, &s, 1, NULL);
+                    double sum = sum_of(&im) / 1000 / m[0];
+                    int inside = beta[b] * sqrt((1 + shear[g]) / (1 - shear[g])) * (sqrt(2.0 * order[n] + 2) + 4) < 4;
+                    check_close(&k, sum, inside ? 1 : sum, 2e-6);
+                    image_free(&im);
+                }
+    check_end(&k);
 }
 
 /* Render; returns the image (owned by the caller) and what the plan was. */
@@ -343,7 +455,10 @@ int main(void)
     only_what_is_needed(&t);
     series();
     strange(&t);
+    sersic();
+    extremes(&t);
     accuracy(&t);
+    library(&t);
     otf_free(&t);
     return check_status();
 }
