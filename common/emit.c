@@ -5,7 +5,6 @@
 #include <string.h>
 
 static const double SIGMA_PER_RE = 0.84932180028801904272;   /* 1 / sqrt(2 ln 2) */
-#define ANGLES 400             /* nodes of the density's integral */
 
 /* ---- Sersic profiles ---- */
 
@@ -39,15 +38,16 @@ static double sersic_b(double n)
  */
 static double stable_density(double a, double lnt)
 {
+    const int angles = (int)(300 + 12 * a / (1 - a));   /* the integrand is narrow when a is near 1 */
     double sum = 0;
-    for (int i = 0; i < ANGLES; i++) {
-        double u = (i + 0.5) * M_PI / ANGLES;
+    for (int i = 0; i < angles; i++) {
+        double u = (i + 0.5) * M_PI / angles;
         double lna = log(sin((1 - a) * u)) + a / (1 - a) * log(sin(a * u)) - 1 / (1 - a) * log(sin(u));
         double lnw = lna - a / (1 - a) * lnt;
         if (lnw < 7)
             sum += exp(lnw - exp(lnw));
     }
-    return sum / ANGLES * a / (1 - a);
+    return sum / angles * a / (1 - a);
 }
 
 int sersic_gaussians(double n, double *sigma, double *flux)
@@ -61,8 +61,9 @@ int sersic_gaussians(double n, double *sigma, double *flux)
     }
     const double a = 1 / (2 * n), b = sersic_b(n), lnb = log(b) / a;
     const double step = 0.6 * fmin(1, 1.4 * (1 - a) / a);
+    const double range = 4 * (1 - a) / a + 3;
     double best = 0, at = 0, sum = 0;
-    for (double l = -60; l < 60; l += step) {   /* weights of flux: density / t */
+    for (double l = -range; l < range; l += fmax(step, 0.01)) {   /* weights of flux: density / t */
         double f = stable_density(a, l) * exp(-l);
         if (f > best) {
             best = f;
