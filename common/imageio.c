@@ -371,7 +371,7 @@ static int read_selected(struct image *im, struct fits_in *f, double max_memory,
         return err_set(e, E_DATA, "%s: HDU %d has %ld planes: a plain image is needed", name, index, h->nz);
     double bytes = 4.0 * (double)h->nx * (double)h->ny;
     if (!(bytes <= max_memory))
-        return err_set(e, E_NOMEM, "%s: %ld x %ld pixels need %.0f MB, more than --max-memory", name,
+        return err_set(e, E_NOMEM, "%s: %ld x %ld pixels need %.3g MB, more than --max-memory", name,
                        h->nx, h->ny, bytes * 1e-6);
     int st = image_new(im, h->nx, h->ny);
     if (st)

@@ -1,6 +1,8 @@
 /*
- * imageio.h - FITS images, in and out.  imageio.c is the only file that
- * includes fitsio.h.
+ * imageio.h - FITS images and tables, in and out, by our own reader
+ * (imageio.c, fitswalk.c, fitstable.c) and writer (fitsout.c).  Only imageio.c
+ * may include fitsio.h; it will need it for tile-compressed images, which are
+ * refused.
  *
  * Names are literal.  When no file has the literal name, one suffix is
  * understood: [n] (0 = primary), [EXTNAME] or [EXTNAME,ver]; "-" is standard

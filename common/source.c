@@ -229,8 +229,10 @@ int source_need(struct source *s, uint64_t end, uint64_t *have, struct err *e)
         if (s->held == s->cap) {
             uint64_t cap = s->cap ? 2 * s->cap : BLOCK;
             if (s->held >= s->limit)
-                return err_set(e, E_NOMEM, "%s: needs more than --max-memory (%.0f MB)", s->name,
+                return err_set(e, E_NOMEM, "%s: needs more than --max-memory (%.3g MB)", s->name,
                                (double)s->limit * 1e-6);
+            if (cap > s->limit)
+                cap = s->limit;
             unsigned char *p = realloc(s->mem, (size_t)cap);
             if (!p)
                 return err_set(e, E_NOMEM, "%s: out of memory", s->name);

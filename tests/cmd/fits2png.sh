@@ -84,6 +84,8 @@ fails "crop with three numbers" 2 fits2png --crop 1,1,2 a.fits -o x.png
 fails "crop of half a pixel" 2 fits2png --crop 1.5,1,2,2 a.fits -o x.png
 fails "crop outside" 1 fits2png --crop 2,2,4,2 a.fits -o x.png
 fails "low above high" 1 fits2png --low 5 --high 5 a.fits -o x.png
+fails "a pipe beyond --max-memory" 1 bash -c "cat a.fits | fits2png --max-memory 4K - -o x.png"
+ok "a pipe within --max-memory" bash -c "cat a.fits | fits2png --max-memory 6K - -o y.png"
 fails "no such file" 1 fits2png nothing.fits -o x.png
 fails "an empty file" 1 fits2png /dev/null -o x.png
 ln -s /dev/full full.png
