@@ -118,26 +118,26 @@ near "pole: flux of both" "$(paste -d' ' <($F dump pole.fits 1) <($F dump pole.f
 near "pole: pixels fall on pixels, NOISECOR" "$($F card pole.fits 1 NOISECOR)" 1 0
 
 # ---- reference images
-T=$SHARED/truth/drizzle
-if [ -d "$T" ] && python3=$(command -v /usr/bin/python3) && $python3 -c 'import astropy' 2>/dev/null; then
-    compare() { ok "$1" $python3 "$SHARED/tools/compare_drizzle.py" out.fits "$T/$2.fits.gz" --wht 'out.fits[WHT]' "$T/$2.fits.gz[WHT]" "${@:3}"; }
-    maps() { for i in 0 1 2 3; do printf -- '--weight\n%s\n' "$T/$1_in$i.fits.gz[WHT]"; done; }
+truth=$SHARED/truth/drizzle
+if [ -d "$truth" ] && python3=$(command -v /usr/bin/python3) && $python3 -c 'import astropy' 2>/dev/null; then
+    compare() { ok "$1" $python3 "$SHARED/tools/compare_drizzle.py" out.fits "$truth/$2.fits.gz" --wht 'out.fits[WHT]' "$truth/$2.fits.gz[WHT]" "${@:3}"; }
+    maps() { for i in 0 1 2 3; do printf -- '--weight\n%s\n' "$truth/$1_in$i.fits.gz[WHT]"; done; }
     for k in square:0.5 point:0.5 square:1.0; do
         n=shift_${k%:*}_pf${k#*:}_exact; mapfile -t M < <(maps shift)
-        drizzle "$T"/shift_in[0-3].fits.gz "${M[@]}" --like "$T/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
+        drizzle "$truth"/shift_in[0-3].fits.gz "${M[@]}" --like "$truth/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
         compare "$n, 2e-6 rms" $n --rtol 1e-7
     done
     mapfile -t M < <(maps rot)
-    drizzle "$T"/rot_in[0-3].fits.gz "${M[@]}" --like "$T/rot_square_pf0.8_exact.fits.gz" --pixfrac 0.8 --units mean -o out.fits
+    drizzle "$truth"/rot_in[0-3].fits.gz "${M[@]}" --like "$truth/rot_square_pf0.8_exact.fits.gz" --pixfrac 0.8 --units mean -o out.fits
     compare "rot_square_pf0.8_exact, 2e-5 rms" rot_square_pf0.8_exact --rtol 2e-5 --atol 2e-5 --watol 2e-5
     for k in turbo:0.5 gaussian:1.0; do
         n=shift_${k%:*}_pf${k#*:}; mapfile -t M < <(maps shift)
-        drizzle "$T"/shift_in[0-3].fits.gz "${M[@]}" --like "$T/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
+        drizzle "$truth"/shift_in[0-3].fits.gz "${M[@]}" --like "$truth/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
         compare "$n, 1e-5 rms away from the frame" $n --border 8 --atol 1e-5
     done
     # STScI's lanczos reads a table with steps of 0.01: 1e-2 rms
     mapfile -t M < <(maps shift)
-    drizzle "$T"/shift_in[0-3].fits.gz "${M[@]}" --like "$T/shift_lanczos3_pf1.0.fits.gz" --kernel lanczos3 --units mean -o out.fits
+    drizzle "$truth"/shift_in[0-3].fits.gz "${M[@]}" --like "$truth/shift_lanczos3_pf1.0.fits.gz" --kernel lanczos3 --units mean -o out.fits
     compare "lanczos3, 2e-2 rms (their table has steps of 0.01)" shift_lanczos3_pf1.0 --border 8 --atol 2e-2 --wrtol 1e-3
 else
     skip "reference images or astropy are missing"
