@@ -124,6 +124,9 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
     p.phot.gain = p.phot.gain > 0 ? p.phot.gain : 0;
     p.phot.saturation = opt_given(own, c, "saturation") ? o->saturation : header_double_or(h, "SATURATE", INFINITY);
     p.phot.windowed = detectcat_windowed(o->columns);
+    int subtracted;
+    if (header_bool(h, "SKYSUB", &subtracted) == OK && subtracted)
+        p.sky_removed = header_double_or(h, "SKYLEVEL", 0);
     p.kernel_fwhm = 2;
     if (f->psf_fwhm > 0 && f->scale > 0) {
         p.phot.psf_fwhm = f->psf_fwhm / f->scale;

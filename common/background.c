@@ -153,7 +153,7 @@ static int clamp_bin(double b)
     return b < 0 ? 0 : b > BINS ? BINS : (int)b;
 }
 
-void background_clip(const float *v, long n, double gain, double *level, double *sigma)
+void background_clip(const float *v, long n, double gain, double removed, double *level, double *sigma)
 {
     double pivot = (double)v[n / 2], centre, s;
     int whole;
@@ -192,7 +192,7 @@ void background_clip(const float *v, long n, double gain, double *level, double 
         return;
     }
     /* photon noise of level B at gain g: third moment B/g^2 puts the median B/(6 g^2 rms^2) below the mean */
-    double photon = gain > 0 ? centre / (gain * rms * rms) : 0;
+    double photon = gain > 0 ? (centre + removed) / (gain * rms * rms) : 0;
     if (photon > 0 && photon < 1.3)
         median += (photon < 1 ? photon : 1) / (6 * gain);
     *level = fabs(mean - median) < 0.3 * rms ? 2.5 * median - 1.5 * mean : median;
@@ -284,9 +284,9 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
             long n = gather(c, x0, x1, y0, y1, buf), at = j * c->mx + i;
             c->level[at] = c->sigma[at] = NAN;
             if (n > 0 && n * 4 >= (x1 - x0) * (y1 - y0))
-                background_clip(buf, n, c->p->gain, &c->level[at], &c->sigma[at]);
+                background_clip(buf, n, c->p->gain, c->p->removed, &c->level[at], &c->sigma[at]);
             else if (n > 0 && c->mx * c->my == 1)
-                background_clip(buf, n, c->p->gain, &c->level[at], &c->sigma[at]);
+                background_clip(buf, n, c->p->gain, c->p->removed, &c->level[at], &c->sigma[at]);
         }
     free(buf);
     return OK;

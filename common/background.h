@@ -34,14 +34,15 @@ struct background_params {
     long filter;           /* side of the median filter, cells, odd, 1: none */
     double gain;           /* electrons per unit of the image, 0 unknown: the median of photon noise
                               lies 1/6 electron below its mean and is moved there */
+    double removed;        /* sky already subtracted from the image, in its unit: its photon noise is still there */
     int threads;
 };
 
 /*
  * Level and standard deviation of n values, by the clipping described above.
- * work: room for n floats.  All values finite, n >= 1.
+ * gain, removed: as below.  All values finite, n >= 1.
  */
-void background_clip(const float *v, long n, double gain, double *level, double *sigma);
+void background_clip(const float *v, long n, double gain, double removed, double *level, double *sigma);
 
 /*
  * Measure.  Pixels that are not finite do not count, nor do those where rms_map

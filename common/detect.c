@@ -99,7 +99,7 @@ static int filtered_noise(const struct image *im, const struct background *b, co
             double level, sigma, pixel = map ? 1 : m->pivot + m->node[j * m->mx + i];
             if (k * 4 < (box[1] - box[0]) * (box[3] - box[2]) || !(pixel > 0))
                 continue;
-            background_clip(cell, k, 0, &level, &sigma);
+            background_clip(cell, k, 0, 0, &level, &sigma);
             if (sigma > 0)
                 ratio[n++] = sigma / (noise > 0 ? noise : pixel);
         }
@@ -280,7 +280,7 @@ static int measure_all(const struct image *im, const float *map, const struct de
 static int prepare(const struct image *im, float *map, int relative, const struct detect_params *p,
                    struct detection *d)
 {
-    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->threads};
+    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, p->threads};
     int st = background_measure(&d->background, im, map, &bp);
     if (st)
         return st;

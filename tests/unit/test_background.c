@@ -25,7 +25,7 @@ static double poisson(double mean, uint64_t i)
 }
 
 /* Mean error of the level over many cells of 64 x 64, in units of the rms, and of the rms. */
-static void cells_of(const char *what, double mean, double sigma, int integers, double gain, double tol)
+static void cells_of(const char *what, double mean, double sigma, int integers, double gain, double removed, double tol)
 {
     enum { CELLS = 300, N = 4096 };
     static float v[N];
@@ -34,10 +34,10 @@ static void cells_of(const char *what, double mean, double sigma, int integers, 
         double level, s;
         for (int i = 0; i < N; i++) {
             uint64_t k = (uint64_t)c * N + (uint64_t)i;
-            v[i] = integers ? (float)poisson(mean, k) : (float)(mean + sigma * draw(k));
+            v[i] = integers ? (float)(poisson(mean, k) - removed) : (float)(mean + sigma * draw(k));
         }
-        background_clip(v, N, gain, &level, &s);
-        bias += (level - mean) / sigma / CELLS;
+        background_clip(v, N, gain, removed, &level, &s);
+        bias += (level + removed - mean) / sigma / CELLS;
         ratio += s / sigma / CELLS;
     }
     /* error of 300 means of 2.5 median - 1.5 mean of 4096: 1.9 sigma / sqrt(4096 * 300) = 0.0017 */
@@ -57,7 +57,7 @@ static void plane(long nx, long ny, long cell)
         for (long x = 0; x < nx; x++)
             im.pix[y * nx + x] = (float)(1000 + 0.01 * (double)x - 0.02 * (double)y + draw((uint64_t)(y * nx + x)));
     struct background b;
-    struct background_params p = {cell, 3, 0, 1};
+    struct background_params p = {cell, 3, 0, 0, 1};
     int st = background_measure(&b, &im, NULL, &p);
     if (!check_that(st == OK, "background of %ld x %ld in cells of %ld", nx, ny, cell))
         return;
@@ -89,7 +89,7 @@ static void bad_pixels(void)
 {
     struct image im = {0};
     struct background a, b;
-    struct background_params p = {32, 3, 0, 1}, p2 = {32, 3, 0, 2};
+    struct background_params p = {32, 3, 0, 0, 1}, p2 = {32, 3, 0, 0, 2};
     if (image_new(&im, 200, 200))
         return;
     for (long i = 0; i < 40000; i++)
@@ -131,18 +131,18 @@ static void scales(void)
     struct check c = check_begin("values times 1e20 and 1e-20, pedestal 1e7");
     for (int i = 0; i < N; i++)
         v[i] = (float)draw((uint64_t)i);
-    background_clip(v, N, 0, &l0, &s0);
+    background_clip(v, N, 0, 0, &l0, &s0);
     for (int k = -1; k <= 1; k += 2) {
         double f = pow(10, 20 * k);
         for (int i = 0; i < N; i++)
             v[i] = (float)(f * draw((uint64_t)i));
-        background_clip(v, N, 0, &l, &s);
+        background_clip(v, N, 0, 0, &l, &s);
         check_close(&c, l / f, l0, 1e-3);      /* bins of 0.01 sigma may shift by rounding */
         check_close(&c, s / f, s0, 1e-3);
     }
     for (int i = 0; i < N; i++)
         v[i] = (float)(1e7 + 20 * draw((uint64_t)i));
-    background_clip(v, N, 0, &l, &s);
+    background_clip(v, N, 0, 0, &l, &s);
     check_close(&c, (l - 1e7) / 20, l0, 0.01); /* float32 steps of 1 there */
     check_close(&c, s / 20, s0, 0.005);
     check_end(&c);
@@ -152,11 +152,12 @@ static void scales(void)
 
 int main(void)
 {
-    cells_of("Gaussian noise", 0, 1, 0, 0, 0.01);
-    cells_of("Gaussian noise on a pedestal, gain given", 1000, 10, 0, 1, 0.01);
-    cells_of("Poisson 250, whole numbers, gain 1", 250, sqrt(250), 1, 1, 0.02);
-    cells_of("Poisson 40, whole numbers, gain 1", 40, sqrt(40), 1, 1, 0.02);
-    cells_of("Poisson 8, whole numbers, gain 1", 8, sqrt(8), 1, 1, 0.02);
+    cells_of("Gaussian noise", 0, 1, 0, 0, 0, 0.01);
+    cells_of("Gaussian noise on a pedestal, gain given", 1000, 10, 0, 1, 0, 0.01);
+    cells_of("Poisson 250, whole numbers, gain 1", 250, sqrt(250), 1, 1, 0, 0.02);
+    cells_of("Poisson 40, whole numbers, gain 1", 40, sqrt(40), 1, 1, 0, 0.02);
+    cells_of("Poisson 8, whole numbers, gain 1", 8, sqrt(8), 1, 1, 0, 0.02);
+    cells_of("Poisson 40 with its sky subtracted", 40, sqrt(40), 1, 1, 40, 0.02);
     plane(512, 300, 64);
     plane(100, 64, 64);
     plane(7, 5, 64);

@@ -1,0 +1,89 @@
+# detect against Source Extractor at the same settings on a field made here, both scored against the scene list.
+sex=$(command -v source-extractor || command -v sex)
+if [ -z "$sex" ]; then skip "source-extractor is not installed: detect is not compared"; exit 0; fi
+for p in galgen psfgen simage addnoise; do [ -x "$BIN/$p" ] || { skip "$p is not built: detect is not compared"; exit 0; }; done
+N=1000 SCALE=0.10
+galgen -n 2200 --field 100 -s 21 -o scene.txt --models models.txt
+psfgen -o psf.fits
+simage scene.txt --models models.txt -p psf.fits -x $SCALE --size $N,$N --accuracy 1e-4 -o clean.fits
+addnoise --depth 27.7 clean.fits -o field.fits
+zp=$(card field.fits MAGZERO)
+awk 'BEGIN { print "CONV NORM"; s = 1.5 / 2.35482; for (j = -2; j <= 2; j++) { for (i = -2; i <= 2; i++) printf "%.6f ", exp(-(i * i + j * j) / (2 * s * s)); print "" } }' >k.conv
+printf '%s\n' NUMBER X_IMAGE Y_IMAGE FLUX_AUTO FLUXERR_AUTO MAG_AUTO A_IMAGE B_IMAGE FLUX_RADIUS ISOAREA_IMAGE FLAGS BACKGROUND THRESHOLD >p.param
+"$sex" -dd >empty.sex 2>/dev/null
+"$sex" field.fits -c empty.sex -CATALOG_NAME sex.cat -CATALOG_TYPE ASCII_HEAD -PARAMETERS_NAME p.param -FILTER Y -FILTER_NAME k.conv \
+    -DETECT_MINAREA 5 -DETECT_THRESH 1.5 -ANALYSIS_THRESH 1.5 -DEBLEND_NTHRESH 32 -DEBLEND_MINCONT 0.005 -CLEAN Y -CLEAN_PARAM 1 \
+    -MAG_ZEROPOINT "$zp" -GAIN 1 -GAIN_KEY NONE -SATUR_LEVEL 1000000000 -SATUR_KEY NONE -BACK_SIZE 64 -BACK_FILTERSIZE 3 -PIXEL_SCALE 0 -VERBOSE_TYPE QUIET 2>sex.err
+detect field.fits --kernel 0.15 --threshold 1.5 --threshold-noise pixel --min-area 5 --columns NUMBER,X_IMAGE,Y_IMAGE,FLUX_AUTO,FLUXERR_AUTO,MAG_AUTO,A_IMAGE,B_IMAGE,FLUX_RADIUS,ISOAREA_IMAGE,FLAGS,BACKGROUND,THRESHOLD -o mine.cat
+between "objects of Source Extractor" "$(grep -vc '^#' sex.cat)" 300 3000
+
+# pairs within 2 px, mutual nearest: columns of A then columns of B
+awk '!/^#/ { if (FNR == NR) { a[++n] = $0; ax[n] = $2; ay[n] = $3; g = int($2 / 8) "," int($3 / 8); c[g] = c[g] " " n }
+    else { b[++m] = $0; bx[m] = $2; by[m] = $3 } }
+    END { for (j = 1; j <= m; j++) { best = 4; u = int(bx[j] / 8); v = int(by[j] / 8)
+        for (p = u - 1; p <= u + 1; p++) for (q = v - 1; q <= v + 1; q++) { k = split(c[p "," q], w, " ")
+            for (i = 1; i <= k; i++) { d = (ax[w[i]] - bx[j])^2 + (ay[w[i]] - by[j])^2
+                if (d < best) { best = d; to[j] = w[i] } if (!((w[i]) in near) || d < near[w[i]]) { near[w[i]] = d; from[w[i]] = j } } } }
+      for (j = 1; j <= m; j++) if (to[j] && from[to[j]] == j) print a[to[j]], b[j] }' sex.cat mine.cat >pairs.txt
+med() { sort -g | awk '{ v[NR] = $1 } END { print NR ? (v[int((NR + 1) / 2)] + v[int(NR / 2) + 1]) / 2 : "none" }'; }
+all=$(awk '!/^#/ && $4 > 5 * $5' sex.cat | wc -l)
+found=$(awk '$4 > 5 * $5' pairs.txt | wc -l)
+between "of Source Extractor's $all objects with S/N > 5 found" "$(awk -v a="$found" -v b="$all" 'BEGIN { print a / b }')" 0.97 1
+near "AUTO magnitudes of the common ones, median difference" "$(awk '$4 > 5 * $5 { print $19 - $6 }' pairs.txt | med)" 0 0.02
+near "their scatter (median modulus)" "$(awk '$4 > 5 * $5 { d = $19 - $6; print d < 0 ? -d : d }' pairs.txt | med)" 0 0.05
+near "ratio of the errors" "$(awk '$4 > 5 * $5 { print $18 / $5 }' pairs.txt | med)" 1 0.05
+near "A_IMAGE of unblended ones" "$(awk '$11 == 0 && $24 == 0 { print $20 / $7 }' pairs.txt | med)" 1 0.005
+near "positions of unblended ones, median distance" "$(awk '$11 == 0 && $24 == 0 { print sqrt(($2 - $15)^2 + ($3 - $16)^2) }' pairs.txt | med)" 0 0.01
+near "FLUX_RADIUS" "$(awk '$11 == 0 && $24 == 0 { print $22 / $9 }' pairs.txt | med)" 1 0.02
+near "threshold" "$(awk '{ print $26 / $13 }' pairs.txt | head -1)" 1 0.01
+near "background, units of 17 electrons rms" "$(awk '{ print ($25 - $12) / 17 }' pairs.txt | med)" 0 0.04
+
+# both against the scene: matched (within 3 px and 2 mag), purity, median position error and magnitude bias brighter than 25
+score() {
+    awk -v n=$N -v s=$SCALE '/^#/ { if (FNR == NR && $2 !~ /^[0-9]/) for (i = 2; i <= NF; i++) h[$i] = i - 1; next }
+        FNR == NR { x[++t] = $h["DX"] / s + (n + 1) / 2; y[t] = $h["DY"] / s + (n + 1) / 2; m[t] = $h["MAG"]; g = int(x[t] / 8) "," int(y[t] / 8); c[g] = c[g] " " t; next }
+        $2 < 10 || $3 < 10 || $2 > n - 9 || $3 > n - 9 { next }
+        { all++; best = 9; hit = 0; u = int($2 / 8); v = int($3 / 8)
+          for (p = u - 1; p <= u + 1; p++) for (q = v - 1; q <= v + 1; q++) { k = split(c[p "," q], w, " ")
+            for (i = 1; i <= k; i++) { d = ($2 - x[w[i]])^2 + ($3 - y[w[i]])^2; dm = $6 - m[w[i]]
+                if (!(w[i] in used) && d < best && dm < 2 && dm > -2) { best = d; hit = w[i] } } }
+          if (hit) { used[hit] = 1; ok++; if (m[hit] < 25.5) { pos[++b] = sqrt(best); mag[b] = $6 - m[hit] } } }
+        function middle(a, k,  i, j, v) { for (i = 2; i <= k; i++) { v = a[i]; for (j = i - 1; j > 0 && a[j] > v; j--) a[j + 1] = a[j]; a[j + 1] = v } return a[int((k + 1) / 2)] }
+        END { print ok, ok / all, middle(pos, b), middle(mag, b) }' scene.txt "$1"
+}
+read -r ms ps ds bs < <(score sex.cat)
+read -r mm pm dm bm < <(score mine.cat)
+echo "# at 1.5 sigma both: Source Extractor matched $ms purity $ps position $ds px bias $bs mag; detect $mm $pm $dm $bm"
+# Source Extractor's mode of photon noise is 0.42 electron low, so its 1.5 sigma lies lower: score at the same level in electrons
+k=$(awk '{ print 1.5 * (1 + ($12 - $25) / $26) * $13 / $26 }' pairs.txt | med)
+between "threshold that gives the same level" "$k" 1.45 1.5
+detect field.fits --kernel 0.15 --threshold "$k" --threshold-noise pixel --min-area 5 --columns NUMBER,X_IMAGE,Y_IMAGE,FLUX_AUTO,FLUXERR_AUTO,MAG_AUTO -o level.cat
+read -r mm pm dm bm < <(score level.cat)
+echo "# Source Extractor: matched $ms purity $ps position $ds px bias $bs mag; detect: $mm $pm $dm $bm"
+between "matched, over Source Extractor's" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.99 1.2
+between "purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.005 0.1
+between "position error over Source Extractor's" "$(awk -v a="$dm" -v b="$ds" 'BEGIN { print a / b }')" 0.5 1.02
+between "magnitude bias less Source Extractor's" "$(awk -v a="$bm" -v b="$bs" 'BEGIN { print a - b }')" -0.05 0.01
+
+# the reference field, where it is
+if [ -e "$SHARED/truth/detect/A_100.fits.gz" ] && python3=$(command -v /usr/bin/python3) && "$python3" -c 'import astropy, scipy' 2>/dev/null; then
+    detect "$SHARED/truth/detect/A_100.fits.gz" --kernel 0.15 --threshold 1.5 --threshold-noise pixel --min-area 5 -o A.cat
+    "$python3" "$SHARED/tools/compare_detect.py" A.cat "$SHARED/truth/detect/truth_A.fits.gz" --ref "$SHARED/truth/detect/sextractor_A_100.fits.gz" \
+        --scale 0.10 --size 1638 --ref-completeness-loss 0.01 --ref-purity-loss 0.005 --min-completeness 0.867 --max-pos-rms 0.1754 >A.txt
+    if [ $? -eq 0 ]; then pass "A_100: $(grep '^catalogue' A.txt | cut -c1-220)"; else fail "A_100: $(grep -E 'FAIL|^cat' A.txt | tr '\n' ' ')"; fi
+else skip "the reference field or astropy is not there: A_100 is not scored"; fi
+if [ -e "$SHARED/data/hdf/hdfn_f814w.fits" ] && python3=$(command -v /usr/bin/python3) && "$python3" -c 'import astropy' 2>/dev/null; then
+    detect "$SHARED/data/hdf/hdfn_f814w.fits" -w "$SHARED/data/hdf/hdfn_f814w_weight.fits" --kernel 0.12758 --pixscale 0.03987 --threshold 1.5 \
+        --threshold-noise pixel --gain 865200 -z 22.09 -o hdf.cat
+    "$python3" - "$SHARED/truth/detect/sextractor_hdf.fits.gz" >hdf.ref <<'P'
+import sys
+from astropy.io import fits
+for r in fits.open(sys.argv[1])[1].data:
+    print(r['NUMBER'], r['X_IMAGE'], r['Y_IMAGE'], r['FLUX_AUTO'] / r['FLUXERR_AUTO'], r['MAG_AUTO'])
+P
+    awk 'FNR == NR { if (!/^#/) { x[++n] = $2; y[n] = $3; m[n] = $(c) } next } $4 > 5 { all++; for (i = 1; i <= n; i++) if ((x[i] - $2)^2 + (y[i] - $3)^2 < 9) { ok++; print m[i] - $5 >"hdf.dm"; break } } END { print all, ok }' \
+        c="$(grep '^# NUMBER' hdf.cat | tail -1 | tr ' ' '\n' | grep -n '^MAG_AUTO$' | cut -d: -f1 | awk '{ print $1 - 1 }')" hdf.cat hdf.ref >hdf.n
+    read -r want got <hdf.n
+    near "HDF section with its weight: found of $want with S/N > 5" "$got" "$want" 0
+    near "their AUTO magnitudes, median difference" "$(med <hdf.dm)" 0 0.05
+else skip "the HDF section or astropy is not there"; fi
