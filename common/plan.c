@@ -62,6 +62,7 @@ struct maker {
     double group_norm;     /* sum of sqrt |flux| of its parts */
     int group_left;        /* parts still to come */
     int used[SIDES];       /* grid number of a side class + 1 */
+    double top[SIDES];     /* highest frequency step that an object of the class keeps */
 };
 
 static double stretch_of(double g)
@@ -262,6 +263,7 @@ static int plan_fourier(struct maker *m, const struct emitter *s, const struct l
     d->kcut = (float)(ceil(lo * w->du * side_of[side] * p->view.pixel) + 1);
     d->grid = (short)side;                 /* side class; becomes the number of a grid later */
     m->used[side] = 1;
+    m->top[side] = fmax(m->top[side], d->kcut);
     return 1;
 }
 
@@ -388,11 +390,13 @@ static int finish_grids(struct maker *m)
     for (int side = 0; side < SIDES; side++) {
         if (!m->used[side])
             continue;
-        int st = stamp_grid_new(&p->grid[p->n_grid], p->view.psf, &r, p->view.pixel, side_of[side]);
+        struct otf t = *p->view.psf;   /* a view of it with a lower cut-off: no row is tabulated that nobody keeps */
+        t.ucut = fmin(t.ucut, (m->top[side] + 1) / (side_of[side] * p->view.pixel));
+        int st = stamp_grid_new(&p->grid[p->n_grid], &t, &r, p->view.pixel, side_of[side]);
         if (st)
             return st;
         p->fft_plans++;
-        p->bytes += stamp_grid_bytes(p->view.psf->ucut, p->view.pixel, side_of[side], !otf_is_real(p->view.psf));
+        p->bytes += stamp_grid_bytes(t.ucut, p->view.pixel, side_of[side], !otf_is_real(p->view.psf));
         m->used[side] = ++p->n_grid;
     }
     for (size_t i = 0; i < p->n; i++)
