@@ -345,6 +345,12 @@ static void measure_curve(struct input *in, const struct params *p, const struct
 {
     struct starmom s;
     double own;
+    if (c->check) {
+        need_scale(in);
+        printf("%zu stars on %ld x %ld pixels of %g arcsec; %d widths; about %.2g s\n", in->cat.nrow, in->nx, in->ny,
+               in->scale, STARMOM_WIDTHS, 2e-3 * (double)in->cat.nrow);
+        return;
+    }
     measure_stars(&s, in, c->argv[1], p, c->threads, &own);
     check(starmom_to_table(&s, out), c->argv[1]);
     copy_keywords(out, &in->hdr);
@@ -383,6 +389,8 @@ int main(int argc, char **argv)
         {"pixscale", 'x', OPT_REAL, &p.scale, 0, 1e4, "ARCSEC", "pixel scale over the header's, arcsec (0: header)", NULL, 0},
         {0}};
     opt_parse(&prog, own, &c, argc, argv);
+    if (strcmp(c.argv[0], "-") == 0 && strcmp(c.argv[1], "-") == 0)
+        die(EXIT_USAGE, "image and catalogue cannot both be standard input");
     if (!p.stars_only && !p.stars == !p.psf)
         die(EXIT_USAGE, "give one of --stars FILE, --psf FILE, --psf none");
 

@@ -103,6 +103,17 @@ near "CROWDED: 17 % of the weight masked" "$(col masked.out FLAGS_RRG)" 128 0
 echo '# NUMBER X_IMAGE Y_IMAGE A_IMAGE B_IMAGE' >empty.cat
 ok "empty catalogue" rrgshape im.fits empty.cat --psf none -o empty.out
 near "empty catalogue gives a header only" "$(grep -vc '^#' empty.out)" 0 0
+# a weight map: 0.1 (1 of 11 steps) everywhere, so as 1/variance a variance of 10
+{ head -c 2880 seg0.fits; awk 'BEGIN { for (k = 0; k < 4096; k++) printf "%c", 2; for (; k % 2880; k++) printf " " }'; } >wht.fits
+rrgshape im.fits one.cat --psf none --weight wht.fits -o rel.out; rrgshape im.fits one.cat --psf none -o now.out
+near "a constant relative weight changes nothing" "$(col rel.out S_RRG)" "$(col now.out S_RRG)" 0
+near "nor the error" "$(col rel.out SERR_RRG)" "$(col now.out SERR_RRG)" 1e-9
+sed "s/SETNAME = 'test    '/WHTTYPE = 'IVM     '/" wht.fits >ivm.fits
+rrgshape im.fits one.cat --psf none --weight ivm.fits -o ivm.out
+# pi w^2 10 of sky and the object's own light at gain 1: 10 x 44.2 + sum W^2 I, w = 3.75
+between "1/variance: error of the flux" "$(col ivm.out SERR_RRG)" 21.0 35
+fails "image and catalogue from one pipe" 2 rrgshape - - --psf none
+rrgshape --stars-only im.fits im.cat --check >plan.txt; near "--check of stars: one line" "$(wc -l <plan.txt)" 1 0
 fails "neither stars nor PSF" 2 rrgshape im.fits im.cat
 fails "both stars and PSF" 2 rrgshape im.fits im.cat --psf none --stars x
 fails "one operand" 2 rrgshape im.fits --psf none

@@ -206,6 +206,48 @@ static void masks(void)
     check_that(measure(&blend, o, 0).flags == SHAPE_CROWDED, "neighbours on both sides: CROWDED");
 }
 
+/* Weight maps: inverse variance, relative, pixels without weight. */
+static void weights(void)
+{
+    enum { N = 41 };
+    static double pix[N * N];
+    static float inverse[N * N], relative[N * N];
+    stamp_fill(pix, N);
+    stamp_gauss(pix, N, 20, 20, 1000, 4, 0, 4);
+    for (int k = 0; k < N * N; k++) {
+        inverse[k] = 0.25f;
+        relative[k] = k % N < 20 ? 2 : 4;
+    }
+    struct moments_object o = {.x = 20, .y = 20, .w = 3, .sky_var = 4};
+    struct moments_map map = {.nx = N, .ny = N, .pix64 = pix};
+    struct moments plain = measure(&map, o, 0), m;
+    map.weight = inverse;
+    map.weight_inverse = 1;
+    o.sky_var = 99;
+    m = measure(&map, o, 0);
+    struct check c = check_begin("weight maps: 1/variance 0.25 is a variance of 4; half the weight on one side, twice its variance");
+    check_close(&c, m.s_var, plain.s_var, 1e-12 * plain.s_var);
+    check_close(&c, m.cov[0], plain.cov[0], 1e-12 * plain.cov[0]);
+    map.weight = relative;
+    map.weight_inverse = 0;
+    o.sky_var = 4;
+    m = measure(&map, o, 0);
+    /* columns left of the centre count twice; the central one, sum exp(0) of sum exp(-x^2/9), once */
+    double all = 0;
+    for (int i = -12; i <= 12; i++)
+        all += exp(-i * i / 9.);
+    check_close(&c, m.s_var / plain.s_var, 1 + 0.5 * (1 - 1 / all), 1e-4);
+    check_close(&c, m.flags, 0, 0.1);
+    relative[20 * N + 23] = 0;
+    m = measure(&map, o, 0);
+    check_close(&c, m.flags, SHAPE_BADPIX, 0.1);
+    relative[20 * N + 23] = 4;
+    relative[0] = -1;
+    m = measure(&map, o, 0);
+    check_close(&c, m.flags, 0, 0.1);
+    check_end(&c);
+}
+
 /* Expected of the hard stamps: x y S Jxx Jxy Jyy (0-based), NaN: not checked; flags. */
 static void hard_stamps(const char *dir)
 {
@@ -346,6 +388,7 @@ int main(void)
     symmetries();
     errors_monte_carlo();
     masks();
+    weights();
     refusals();
     if (stamps_present(dir)) {
         truth_stamps(dir);
