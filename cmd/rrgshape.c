@@ -18,7 +18,7 @@
 
 struct params {
     const char *stars, *psf, *weight, *segmentation;
-    double width, fixed, min, max, cut, scale;
+    double width, fixed, min, max, cut, scale, pixel;
     int fourth, correction, average;
     int centroid, no_recenter, no_background, stars_only;
     long max_stars;
@@ -212,18 +212,30 @@ static void read_curve(struct starmom *s, const char *name, const struct input *
     table_free(&t);
 }
 
+/* Side of the pixel that collected the light, arcsec: option; the CCD's in a drizzled image; else the image's. */
+static double pixel_response(const struct input *in, double option)
+{
+    double ccd, frac;
+    if (option > 0)
+        return option;
+    if (header_double(&in->hdr, "PIXFRAC", &frac) == OK && header_double(&in->hdr, "CCDSCALE", &ccd) == OK && ccd > 0)
+        return ccd;
+    return in->scale;
+}
+
 /* Moments of a PSF that is known: a file of psfgen or any image of a PSF. */
-static void known_psf(struct starmom *s, const char *name, const struct input *in, double max_memory)
+static void known_psf(struct starmom *s, const char *name, const struct input *in, double option, double max_memory)
 {
     struct err e;
     struct otf t;
     struct psf_options po = {.max_memory = max_memory};
     need_scale(in);
+    double pixel = pixel_response(in, option);
     if (psf_read(name, &po, &t, NULL, &e))
         die(EXIT_RUN, "%s", e.text);
-    if (t.pixel > 0 && !(fabs(t.pixel / in->scale - 1) < 1e-6))
-        die(EXIT_RUN, "%s: contains a pixel of %g arcsec, but %s has %g", name, t.pixel, in->name, in->scale);
-    int st = starmom_from_otf(s, &t, in->scale);
+    if (t.pixel > 0 && !(fabs(t.pixel / pixel - 1) < 1e-6))
+        die(EXIT_RUN, "%s: contains a pixel of %g arcsec, but %s was taken with %g", name, t.pixel, in->name, pixel);
+    int st = starmom_from_otf(s, &t, in->scale, pixel);
     if (st == E_RANGE)
         die(EXIT_RUN, "%s: PSF too small to be weighed with 1 arcsec: at least 17 arcsec a side", name);
     check(st, name);
@@ -238,7 +250,7 @@ static struct starmom *find_psf(struct starmom *s, const struct input *in, const
     if (p->psf && strcmp(p->psf, "none") == 0)
         return NULL;
     if (p->psf) {
-        known_psf(s, p->psf, in, c->max_memory);
+        known_psf(s, p->psf, in, p->pixel, c->max_memory);
         return s;
     }
     const char *comma = strrchr(p->stars, ',');
@@ -387,6 +399,7 @@ int main(int argc, char **argv)
         {"star-average", 0, OPT_CHOICE, &p.average, 0, 0, "HOW", "average over stars", "mean|median", 0},
         {"max-stars", 0, OPT_LONG, &p.max_stars, 0, 1e9, "N", "use the first N good stars (0: all)", NULL, 0},
         {"pixscale", 'x', OPT_REAL, &p.scale, 0, 1e4, "ARCSEC", "pixel scale over the header's, arcsec (0: header)", NULL, 0},
+        {"pixel", 0, OPT_REAL, &p.pixel, 0, 1e4, "ARCSEC", "with --psf: side of the pixel that collected the light (0: header)", NULL, 0},
         {0}};
     opt_parse(&prog, own, &c, argc, argv);
     if (strcmp(c.argv[0], "-") == 0 && strcmp(c.argv[1], "-") == 0)

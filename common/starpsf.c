@@ -3,11 +3,11 @@
 #include "psf.h"
 #include <math.h>
 
-int starmom_from_otf(struct starmom *s, const struct otf *t, double scale)
+int starmom_from_otf(struct starmom *s, const struct otf *t, double scale, double response)
 {
     struct starmom r = {.dstar_err = NAN, .dstar_w = fmax(0.8, 0.1 / scale)};
-    double pixel = t->pixel > 0 ? 0 : scale, hi = fmin(fmax(1, 2 * scale), psf_period(t) / 17), p2 = scale * scale;
-    if (!(scale > 0) || (t->pixel > 0 && !(fabs(t->pixel / scale - 1) < 1e-6)))
+    double pixel = t->pixel > 0 ? 0 : response, hi = fmin(fmax(1, 2 * scale), psf_period(t) / 17), p2 = scale * scale;
+    if (!(scale > 0) || !(response >= 0) || (t->pixel > 0 && !(fabs(t->pixel - response) < 1e-6 * response)))
         return E_RANGE;
     int st = starmom_widths(&r, STARMOM_WIDTHS, 0.8, hi / scale);
     for (int i = -1; i < r.n && st == OK; i++) {

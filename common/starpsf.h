@@ -11,10 +11,12 @@
 
 /*
  * Moments at STARMOM_WIDTHS widths from 0.8 px to max(1", 2 px), at most 1/17
- * of the period of t; d* at max(0.8 px, 0.1").  scale: arcsec per pixel; the
- * square pixel is multiplied in unless t contains it.  Pixels in s.
- * E_RANGE: the PSF is too small for the widths, or contains another pixel.
+ * of the period of t; d* at max(0.8 px, 0.1").  scale: arcsec per pixel;
+ * response: side of the square pixel that collected the light, arcsec (larger
+ * than scale in interlaced images), multiplied in unless t contains it.
+ * Pixels of `scale` in s.  E_RANGE: the PSF is too small for the widths, or
+ * contains another pixel.
  */
-MUST_CHECK int starmom_from_otf(struct starmom *s, const struct otf *t, double scale);
+MUST_CHECK int starmom_from_otf(struct starmom *s, const struct otf *t, double scale, double response);
 
 #endif

@@ -131,6 +131,11 @@ if [ -x "$BIN/psfgen" ]; then
     # issue of the definition of d*: .615 px for the stars of ../shared (clear annulus), a little more with vanes and diffusion
     between "d* of the ePSF at 0.10 arcsec, w = 0.1 arcsec, px" "$(key psf.out DSTAR)" 0.55 0.70
     near "the galaxy of 2.5 px before the PSF: JXX below the raw one" "$(paste <(col psf.out JXX_RAW) <(col psf.out JXX) | awk 'NR == 1 { print ($1 > $2) }')" 1 0
+    # an interlaced image: the pixel of 0.2" collected the light, so d* (in pixels of 0.1") is larger
+    sed "s/SHEAR2  =                  0.0/PIXFRAC =                  0.5/; s/SETNAME = 'test    '/CCDSCALE=        0.2/" im.fits >dr.fits
+    rrgshape dr.fits im.cat --psf psf.fits -o dr.out; rrgshape im.fits im.cat --psf psf.fits --pixel 0.2 -o px.out
+    near "drizzled image: pixel of the CCD" "$(key dr.out DSTAR)" "$(key px.out DSTAR)" 1e-12
+    between "d* with a pixel of 0.2 arcsec" "$(key dr.out DSTAR)" 0.65 0.80
 else
     skip "psfgen is not built: --psf FILE"
 fi
