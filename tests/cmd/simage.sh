@@ -131,6 +131,18 @@ fails "a pixel twice" 1 simage one.txt -x 0.1 --size 5,5 -p pixel.fits --psf-nor
 fails "an unknown type" 1 simage <(printf '# DX DY FLUX TYPE\n0 0 1 blob\n') -x 0.1 --size 5,5 -o x.fits
 [ ! -e x.fits ] && pass "no output after a fault" || fail "output after a fault"
 
+# diffusion on top of a PSF without it = a PSF that holds it; one PSF serves every pixel scale
+psfgen --diffusion 0 -o sharp.fits
+psfgen -o soft.fits
+printf '# DX DY FLUX TYPE RE\n0.03 0.01 1 gauss 0.15\n-0.5 0.4 1 star 0.1\n' >pair.txt
+ok "diffusion in the PSF" simage pair.txt -p soft.fits -x 0.1 --size 61,61 --shear 0.02,0.05 --accuracy 1e-5 -o soft_i.fits
+ok "diffusion by simage" simage pair.txt -p sharp.fits --diffusion "$(card soft.fits CHDIFF)" -x 0.1 --size 61,61 --shear 0.02,0.05 --accuracy 1e-5 -o sharp_i.fits
+near "the same image, of the peak" "$(diffmax soft_i.fits sharp_i.fits | awk -v p="$(stat soft_i.fits 4)" '{ print $1 / p }')" 0 3e-5
+near "CHDIFF" "$(card sharp_i.fits CHDIFF)" "$(card soft_i.fits CHDIFF)" 1e-12
+near "PSFFWHM of the sum" "$(card sharp_i.fits PSFFWHM)" "$(card soft_i.fits PSFFWHM)" 1e-4
+ok "without diffusion" simage pair.txt -p sharp.fits -x 0.1 --size 61,61 --shear 0.02,0.05 --accuracy 1e-5 -o none_i.fits
+between "makes a difference, of the peak" "$(diffmax none_i.fits sharp_i.fits | awk -v p="$(stat soft_i.fits 4)" '{ print $1 / p }')" 0.02 1.5
+
 # the independent renderer's truth: shapelets with an exact shear, PSF given as samples
 T=$SHARED/truth/galsim
 if [ -d "$T" ]; then
