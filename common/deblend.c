@@ -172,17 +172,16 @@ static int sort_levels(struct deblend_work *w, double threshold, long levels)
         peak = (double)w->pixel[i].v > peak ? (double)w->pixel[i].v : peak;
     for (size_t k = 0; k < m; k++)
         w->level[k] = (float)(threshold * pow(peak / threshold, (double)k / (double)m));
+    double per_level = peak > threshold ? (double)m / log(peak / threshold) : 0;
     int32_t *start = w->order + n;         /* counts, then first index of each level */
     memset(start, 0, (m + 1) * sizeof *start);
     for (size_t i = 0; i < n; i++) {
-        size_t a = 0, b = m;
-        while (b - a > 1) {
-            size_t mid = (a + b) / 2;
-            if (w->pixel[i].v > w->level[mid])
-                a = mid;
-            else
-                b = mid;
-        }
+        double t = log((double)w->pixel[i].v / threshold) * per_level;
+        size_t a = t > 0 ? t < (double)(m - 1) ? (size_t)t : m - 1 : 0;
+        while (a > 0 && !(w->pixel[i].v > w->level[a]))
+            a--;
+        while (a + 1 < m && w->pixel[i].v > w->level[a + 1])
+            a++;
         w->pixel[i].level = (uint16_t)a;
         start[m - 1 - a + 1]++;
     }
@@ -516,6 +515,20 @@ void ellipse_axes(double xx, double xy, double yy, double *a, double *b, double 
 /* The k-th largest of the n values (k from 1); v is reordered. */
 static double kth_largest(float *v, long n, long k)
 {
+    enum { FEW = 16 };
+    float top[FEW + 1];
+    if (k <= FEW) {                        /* keep the k largest, sorted */
+        long m = 0;
+        for (long i = 0; i < n; i++) {
+            if (m == k && !(v[i] > top[k - 1]))
+                continue;
+            long j = m < k ? m++ : k - 1;
+            for (; j > 0 && top[j - 1] < v[i]; j--)
+                top[j] = top[j - 1];
+            top[j] = v[i];
+        }
+        return (double)top[k - 1];
+    }
     long lo = 0, hi = n - 1, at = k - 1;
     while (lo < hi) {
         float p = v[lo + (hi - lo) / 2];

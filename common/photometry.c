@@ -233,6 +233,21 @@ static double corner(double a, double b, double r)
     return s * quadrant(fabs(a), fabs(b), r);
 }
 
+/* Overlap with the pixel whose nearest corner is (x0, y0), both >= 0: the common case, with one arc sine. */
+static double arc_overlap(double x0, double y0, double r)
+{
+    double x1 = x0 + 1, y1 = y0 + 1, r2 = r * r;
+    double a = r2 > y1 * y1 ? sqrt(r2 - y1 * y1) : 0;      /* the arc crosses the top at a and the bottom at b */
+    double b = sqrt(r2 - y0 * y0);
+    a = a > x0 ? a : x0;
+    b = b < x1 ? b : x1;
+    if (!(b > a))
+        return a - x0 < 1 ? a - x0 : 1;
+    double ha = sqrt(r2 - a * a), hb = sqrt(r2 - b * b > 0 ? r2 - b * b : 0);
+    double sine = (b * ha - a * hb) / r2;                  /* of the angle of the arc */
+    return (a - x0) + 0.5 * (b * hb - a * ha + r2 * asin(sine < 1 ? sine : 1)) - y0 * (b - a);
+}
+
 double circle_overlap(double dx, double dy, double r)
 {
     if (!(r > 0))
@@ -244,6 +259,8 @@ double circle_overlap(double dx, double dy, double r)
     double nx = dx > 0.5 ? dx - 0.5 : 0, ny = dy > 0.5 ? dy - 0.5 : 0;
     if (nx * nx + ny * ny >= r * r)
         return 0;
+    if (dx >= 0.5 && dy >= 0.5)
+        return arc_overlap(dx - 0.5, dy - 0.5, r);
     return corner(dx + 0.5, dy + 0.5, r) - corner(dx - 0.5, dy + 0.5, r)
          - corner(dx + 0.5, dy - 0.5, r) + corner(dx - 0.5, dy - 0.5, r);
 }
