@@ -328,6 +328,29 @@ static void describe(const struct frame *f, const char *in, const struct detect_
             f->zeropoint, mb + 8, 1.2e-8 * (double)image_count(&f->im));
 }
 
+/* Detect and write everything that was asked for. */
+static void search(const struct frame *f, const struct program *prog, const struct opt *own, const struct options *o,
+                   const struct common *c, const struct detect_params *p, const char *const *inputs, size_t n_inputs)
+{
+    const char *in = inputs[0];
+    struct detection d = {0};
+    detect_or_die(f, in, o, p, &d);
+    if (c->verbose)
+        fprintf(stderr, "detect: %s: sky %g, rms %g, threshold %g rms, filtered noise %.4f; %zu found, %zu cleaned\n", in,
+                d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned);
+    char *record = opt_record(prog, own, c);
+    for (size_t i = 0; i < o->checks.n; i++)
+        write_check(o->checks.v[i], f, p, &d, record, inputs, n_inputs);
+    if (o->region && !p->negative)
+        write_region(o->region, &d, inputs, n_inputs);
+    if (p->negative)
+        write_count(c, &d, inputs, n_inputs);
+    else
+        write_catalogue(f, o, c, p, &d, record, inputs, n_inputs);
+    free(record);
+    detection_free(&d);
+}
+
 int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
@@ -402,7 +425,6 @@ int main(int argc, char **argv)
         inputs[n_inputs++] = o.mask;
 
     struct frame f = {0};
-    struct detection d = {0};
     read_frame(&f, in, &o, own, &c);
     struct detect_params p = plan(&f, in, &o, own, &c);
     double *diameter = calloc(o.apertures.n + 1, sizeof *diameter);
@@ -414,25 +436,12 @@ int main(int argc, char **argv)
     p.phot.aperture = diameter;
     if (c.check || c.verbose)
         describe(&f, in, &p);
-    if (c.check)
-        return EXIT_DONE;
-
-    detect_or_die(&f, in, &o, &p, &d);
-    if (c.verbose)
-        fprintf(stderr, "detect: %s: sky %g, rms %g, threshold %g rms, filtered noise %.4f; %zu found, %zu cleaned\n", in,
-                d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned);
-    char *record = opt_record(&prog, own, &c);
-    for (size_t i = 0; i < o.checks.n; i++)
-        write_check(o.checks.v[i], &f, &p, &d, record, inputs, n_inputs);
-    if (o.region && !p.negative)
-        write_region(o.region, &d, inputs, n_inputs);
-    if (p.negative)
-        write_count(&c, &d, inputs, n_inputs);
-    else
-        write_catalogue(&f, &o, &c, &p, &d, record, inputs, n_inputs);
-    free(record);
+    if (!c.check)
+        search(&f, &prog, own, &o, &c, &p, inputs, n_inputs);
     free(diameter);
-    detection_free(&d);
+    free(o.apertures.v);
+    free(o.checks.v);
+    free(c.argv);
     free(f.map);
     sky_close(f.sky);
     image_free(&f.im);
