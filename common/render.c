@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define BATCH_PIXELS 262144    /* doubles held by one batch of stamps: 2 MiB */
-#define CHUNK 4                /* objects a thread takes at a time */
+#define BATCH_PIXELS 524288    /* doubles held by one batch of stamps: 4 MiB */
+#define SHARES 48              /* pieces into which a batch is cut for the threads */
 #define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
 
 int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
@@ -156,7 +156,7 @@ static int run(const struct plan *p, size_t n, const struct entry *e, struct win
     for (size_t begin = 0; begin < n;) {
         size_t m = batch(p, e, begin, n, space, job->stamp);
         job->entry = e + begin;
-        int st = par_for((long)m, CHUNK, threads, draw_some, job);
+        int st = par_for((long)m, 1 + (long)m / SHARES, threads, draw_some, job);
         if (st)
             return st;
         for (size_t i = 0; i < m; i++) {
