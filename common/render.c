@@ -9,6 +9,7 @@
 
 #define BATCH_PIXELS 524288    /* doubles held by one batch of stamps: 4 MiB */
 #define SHARES 48              /* pieces into which a batch is cut for the threads */
+#define STRIPS 8               /* columns of the image added by one thread */
 #define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
 
 int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
@@ -78,12 +79,15 @@ static int draw_some(void *ctx, long begin, long end, int worker)
     return OK;
 }
 
-/* Rows of doubles that slide up the image: row y lives at y % height; the image starts as zeros. */
+/*
+ * Rows of doubles that slide up the image: row y lives at y % height; the image starts as
+ * zeros.  Columns are cut into strips that move by themselves, so that threads can share a batch.
+ */
 struct window {
     struct image *im;
     double *row;
     int height;
-    long next;                     /* first row not yet written to the image */
+    long next[STRIPS];             /* first row of each strip not yet added to the image */
 };
 
 WIDE static void add_doubles(long n, const double *restrict from, double *restrict to)
@@ -98,40 +102,58 @@ WIDE static void add_floats(long n, const double *restrict from, float *restrict
         to[i] = (float)(to[i] + from[i]);
 }
 
-/* Add rows below `end` to the image and clear them. */
-static void window_move(struct window *w, long end)
+static long strip_start(const struct window *w, int strip)
 {
-    const size_t nx = (size_t)w->im->nx;
-    for (; w->next < end; w->next++) {
-        double *from = w->row + (size_t)(w->next % w->height) * nx;
-        add_floats((long)nx, from, w->im->pix + (size_t)w->next * nx);
-        memset(from, 0, nx * sizeof *from);
+    return w->im->nx * strip / STRIPS;
+}
+
+/* Add rows below `end` of a strip to the image and clear them. */
+static void window_move(struct window *w, int strip, long end)
+{
+    const long x0 = strip_start(w, strip), n = strip_start(w, strip + 1) - x0;
+    for (; w->next[strip] < end; w->next[strip]++) {
+        const long y = w->next[strip];
+        double *from = w->row + (size_t)(y % w->height) * (size_t)w->im->nx + x0;
+        add_floats(n, from, w->im->pix + (size_t)y * (size_t)w->im->nx + x0);
+        memset(from, 0, (size_t)n * sizeof *from);
     }
 }
 
-/* A tall stamp, before the window moves. */
-static void image_add(struct image *im, const struct draw *d, const double *stamp)
+/* The part of a stamp inside the strip: to the window, or to the image itself when it is tall. */
+static void strip_add(struct window *w, int strip, const struct draw *d, int tall, const double *stamp)
 {
-    const long x0 = d->x0 < 0 ? 0 : d->x0, x1 = d->x0 + (long)d->nx > im->nx ? im->nx : d->x0 + (long)d->nx;
-    const long y0 = d->y0 < 0 ? 0 : d->y0, y1 = d->y0 + (long)d->ny > im->ny ? im->ny : d->y0 + (long)d->ny;
-    for (long y = y0; y < y1; y++) {
-        float *to = im->pix + (size_t)y * (size_t)im->nx;
-        const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx;
-        add_floats(x1 - x0, from + (x0 - d->x0), to + x0);
-    }
-}
-
-static void window_add(struct window *w, const struct draw *d, const double *stamp)
-{
-    const long nx = w->im->nx;
-    const long x0 = d->x0 < 0 ? 0 : d->x0, x1 = d->x0 + (long)d->nx > nx ? nx : d->x0 + (long)d->nx;
+    const long nx = w->im->nx, left = strip_start(w, strip), right = strip_start(w, strip + 1);
+    const long x0 = d->x0 < left ? left : d->x0, x1 = d->x0 + (long)d->nx > right ? right : d->x0 + (long)d->nx;
     const long y0 = d->y0 < 0 ? 0 : d->y0, y1 = d->y0 + (long)d->ny > w->im->ny ? w->im->ny : d->y0 + (long)d->ny;
-    window_move(w, y0);
+    if (x0 >= x1)
+        return;
+    if (!tall)
+        window_move(w, strip, y0);
     for (long y = y0; y < y1; y++) {
-        double *to = w->row + (size_t)(y % w->height) * (size_t)nx;
-        const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx;
-        add_doubles(x1 - x0, from + (x0 - d->x0), to + x0);
+        const double *from = stamp + (size_t)(y - d->y0) * (size_t)d->nx + (x0 - d->x0);
+        if (tall)
+            add_floats(x1 - x0, from, w->im->pix + (size_t)y * (size_t)nx + x0);
+        else
+            add_doubles(x1 - x0, from, w->row + (size_t)(y % w->height) * (size_t)nx + x0);
     }
+}
+
+struct addition {
+    const struct plan *p;
+    const struct entry *entry;
+    double *const *stamp;
+    size_t n;
+    struct window *w;
+};
+
+static int add_strips(void *ctx, long begin, long end, int worker)
+{
+    const struct addition *a = ctx;
+    (void)worker;
+    for (long strip = begin; strip < end; strip++)
+        for (size_t i = 0; i < a->n; i++)
+            strip_add(a->w, (int)strip, &a->p->draw[a->entry[i].index], a->entry[i].row < 0, a->stamp[i]);
+    return OK;
 }
 
 /* Number of entries from `begin` whose stamps fit one batch (at least one), and where they go. */
@@ -159,16 +181,14 @@ static int run(const struct plan *p, size_t n, const struct entry *e, struct win
         int st = par_for((long)m, 1 + (long)m / SHARES, threads, draw_some, job);
         if (st)
             return st;
-        for (size_t i = 0; i < m; i++) {
-            const struct draw *d = &p->draw[e[begin + i].index];
-            if (e[begin + i].row < 0)
-                image_add(w->im, d, job->stamp[i]);
-            else
-                window_add(w, d, job->stamp[i]);
-        }
+        struct addition add = {p, e + begin, job->stamp, m, w};
+        st = par_for(STRIPS, 1, threads, add_strips, &add);
+        if (st)
+            return st;
         begin += m;
     }
-    window_move(w, w->im->ny);
+    for (int strip = 0; strip < STRIPS; strip++)
+        window_move(w, strip, w->im->ny);
     return OK;
 }
 
