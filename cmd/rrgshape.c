@@ -178,13 +178,9 @@ static void measure_stars(struct starmom *s, const struct input *in, const char 
     struct shapecat_options o = options(p, in, threads);
     o.fixed = 0;
     o.moments.fixed_centre = 0;
-    if (shapecat_objects(&in->cat, &o, &stars, &e))
+    size_t n;
+    if (shapecat_stars(&in->cat, &o, 1 / in->scale, &stars, &n, &e))
         fail(cat, &e);
-    size_t n = 0;
-    const struct column *flags = table_find(&in->cat, "FLAGS");
-    for (size_t i = 0; i < in->cat.nrow; i++)
-        if (!flags || table_number(flags, i) == 0)
-            stars[n++] = stars[i];
     *s = (struct starmom){.dstar_w = fmax(0.8, 0.1 / in->scale)};
     check(starmom_widths(s, STARMOM_WIDTHS, 0.8, fmax(1 / in->scale, 2)), in->name);
     int st = starmom_measure(s, &in->map, n, stars, &o.moments, p->max_stars, p->average == 1, threads);

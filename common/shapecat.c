@@ -127,6 +127,38 @@ int shapecat_objects(const struct table *t, const struct shapecat_options *opt, 
     return OK;
 }
 
+/* A brighter object of the catalogue is nearer than radius. */
+static int outshone(size_t n, const struct moments_object *o, const struct column *flux, double radius, size_t i)
+{
+    for (size_t j = 0; j < n; j++)
+        if (fabs(o[j].y - o[i].y) < radius && table_number(flux, j) > table_number(flux, i) &&
+            hypot(o[j].x - o[i].x, o[j].y - o[i].y) < radius)
+            return 1;
+    return 0;
+}
+
+int shapecat_stars(const struct table *t, const struct shapecat_options *opt, double radius,
+                   struct moments_object **stars, size_t *n, struct err *e)
+{
+    struct moments_object *all = NULL, *out;
+    int st = shapecat_objects(t, opt, &all, e);
+    if (st)
+        return st;
+    out = calloc(t->nrow + 1, sizeof *out);
+    if (!out) {
+        free(all);
+        return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
+    }
+    const struct column *flags = table_find(t, "FLAGS"), *flux = table_find(t, "FLUX_AUTO");
+    *n = 0;
+    for (size_t i = 0; i < t->nrow; i++)
+        if ((!flags || table_number(flags, i) < 4) && (!flux || !outshone(t->nrow, all, flux, radius, i)))
+            out[(*n)++] = all[i];
+    free(all);
+    *stars = out;
+    return OK;
+}
+
 struct job {
     const struct moments_map *map;
     const struct moments_object *objects;

@@ -33,6 +33,16 @@ MUST_CHECK int shapecat_objects(const struct table *t, const struct shapecat_opt
                                 struct moments_object **objects, struct err *e);
 
 /*
+ * The rows that may serve as stars, as shapecat_objects() gives them: FLAGS (when
+ * there is such a column) below 4, and no brighter object (FLUX_AUTO) within
+ * `radius` pixels, so that pieces of a bright star's wings go and the star stays.
+ * Blended stars are kept: whether a star is split depends on its place in the
+ * pixel, and leaving those out would make the mean PSF that of the others.
+ */
+MUST_CHECK int shapecat_stars(const struct table *t, const struct shapecat_options *opt, double radius,
+                              struct moments_object **stars, size_t *n, struct err *e);
+
+/*
  * Measure and correct every row and add (or replace) the shape columns.
  * psf NULL: no correction, P = 0.  bad: rows with FLAGS_RRG != 0.
  */

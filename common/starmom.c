@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define LEAST_SNR 20          /* of the weighted flux at dstar_w: noise peaks are no stars */
+
 const char *const starmom_name[STARMOM_N] = {"PXX", "PXY", "PYY", "PXXXX", "PXXXY", "PXXYY", "PXYYY", "PYYYY"};
 
 int starmom_widths(struct starmom *s, int n, double lo, double hi)
@@ -44,7 +46,7 @@ static int measure_stars(void *ctx, long begin, long end, int worker)
                 return st;
             int good = (m.flags & ~SHAPE_NEARSINGULAR) == 0;
             if (k < 0) {
-                job->d[i] = good ? sqrt(0.5 * (m.m2[0] + m.m2[2])) : NAN;
+                job->d[i] = good && m.s * m.s >= LEAST_SNR * LEAST_SNR * m.s_var ? sqrt(0.5 * (m.m2[0] + m.m2[2])) : NAN;
                 continue;
             }
             for (int q = 0; q < STARMOM_N; q++)
@@ -78,11 +80,11 @@ static int choose(struct starmom *s, const double *d, size_t n, long max_stars, 
         mid = stats_median(kept, v);
         for (size_t i = 0; i < kept; i++)
             v[i] = fabs(v[i] - mid);
-        width = fmax(5 * 1.4826 * stats_median(kept, v), 0.02 * mid);
+        width = fmax(10 * 1.4826 * stats_median(kept, v), 0.02 * mid);
     }
     s->dstar = mid;
     /* standard error of a median of normal values: 1.2533 sigma/sqrt(n) */
-    s->dstar_err = kept > 1 ? 1.2533 * width / 5 / sqrt((double)kept) : NAN;
+    s->dstar_err = kept > 1 ? 1.2533 * width / 10 / sqrt((double)kept) : NAN;
     free(v);
     return kept > 1 ? OK : E_MISSING;
 }

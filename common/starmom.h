@@ -36,10 +36,11 @@ MUST_CHECK int starmom_widths(struct starmom *s, int n, double lo, double hi);
 
 /*
  * Measure n stars (start positions; w of each is ignored) at the widths set
- * and at dstar_w.  Left out: flagged stars, and those whose d at dstar_w is
- * farther from the median than 5 sigma (by the median deviation, at least 2 %),
- * which drops blends and noise.  max_stars > 0 keeps the first so many of the
- * rest.  use_median replaces the mean by the median.
+ * and at dstar_w.  Left out: flagged stars, those of signal to noise below 20
+ * at dstar_w, and those whose d there is farther from the median than 10 sigma
+ * (by the median deviation, at least 2 %: wide enough for every place in the
+ * pixel), which drops blends and noise.  max_stars > 0 keeps the first so many
+ * of the rest.  use_median replaces the mean by the median.
  * E_MISSING when fewer than 2 stars are left at some width.
  */
 MUST_CHECK int starmom_measure(struct starmom *s, const struct moments_map *map, size_t n,
