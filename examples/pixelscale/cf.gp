@@ -6,13 +6,18 @@ name(s) = s eq "sim1" ? "Sim 1" : s eq "sim1d" ? "Sim 1 drizzled" : s eq "sim2" 
 sets = "sim1 sim1d sim2 sim2d"
 set xlabel "CCD pixel scale {/Symbol q}_{ccd} / arcsec"
 set ylabel "slope d{/Symbol g}_1 (measured) / dg_1 (input)"
-set offsets 0.01, 0.01, 0.01, 0.01
+set xrange [0.03:0.25]
+set xtics 0.04
+set format y "%.2f"
+set yrange [0.6:1.2]
 do for [t in "svg pdf png"] {
     eval(t eq "svg" ? svg("cf") : t eq "pdf" ? pdf("cf") : png("cf"))
     set multiplot layout 1,2
     do for [v in "plain exact"] {
         set title v eq "plain" ? "plain fourth moments, first-order PSF" : "exact"
-        set key bottom left
+        set key bottom left Left reverse samplen 1
+        if (v eq "exact") { unset key; set ylabel "" }
+        else { set ylabel "slope d{/Symbol g}_1 (measured) / dg_1 (input)" }
         plot 1 with lines lc rgb "#888888" dt 3 notitle, \
             for [i=1:4] s=word(sets, i) rows(v, s, "BPAIR1 BPAIR1SE") using 1:2:3 with yerrorbars ls i title name(s)
     }

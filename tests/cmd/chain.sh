@@ -43,8 +43,8 @@ mkdir elsewhere
 cp scene.txt models.txt elsewhere
 ( cd elsewhere
   psfgen -j 2 -o psf.fits
-  simage scene.txt -j 2 --models ./models.txt -p ../elsewhere/psf.fits $common --shear 0,0 |
-      addnoise -j 2 --depth 27.7 >noisy_0,0.fits
+  simage scene.txt -j 2 --models ./models.txt -p ../elsewhere/psf.fits $common --shear 0,0 >true_0,0.fits
+  addnoise -j 2 --depth 27.7 ../elsewhere/true_0,0.fits -o noisy_0,0.fits
   cp ../stars.rrg .
   detect -j 2 $found --check-image segmentation=seg.fits noisy_0,0.fits >g0.cat
   rrgshape -j 2 noisy_0,0.fits g0.cat --stars ./stars.rrg --segmentation seg.fits >g0.rrg
