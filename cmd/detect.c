@@ -102,7 +102,10 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     if (need > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
     const struct header *h = &f->im.hdr;
-    if (sky_open(&f->sky, h, &e))
+    int wcs = sky_open(&f->sky, h, &e);
+    if (wcs == E_NOMEM)
+        die(EXIT_RUN, "%s: %s", in, e.text);
+    if (wcs)
         f->sky = NULL;
     f->scale = o->pixscale > 0 ? o->pixscale : header_double_or(h, "PIXSCALE", f->sky ? sky_scale(f->sky) : 0);
     f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(h, "PSFFWHM", 0);

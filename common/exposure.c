@@ -93,7 +93,10 @@ int exposure_read(struct fits_in *f, const char *name, int index, struct exposur
     if (header_long(&new.hdr, "EXPNUM", &new.expnum))
         new.expnum = -1;
     struct sky *s;
-    if (sky_open(&s, &new.hdr, NULL) == OK) {
+    int wcs = st == OK ? sky_open(&s, &new.hdr, NULL) : E_MISSING;
+    if (wcs == E_NOMEM)
+        st = err_set(e, wcs, "%s: %s", label, err_text(wcs));
+    if (wcs == OK) {
         double scale = sky_scale(s);
         sky_close(s);
         if (isnan(new.scale))

@@ -3,6 +3,7 @@
 #include "err.h"
 #include <ctype.h>
 #include <errno.h>
+#include <gsl/gsl_errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -437,6 +438,7 @@ static double physical_memory(void)
 void opt_parse(const struct program *prog, const struct opt *own, struct common *c, int argc, char **argv)
 {
     struct parser p = {prog, own, c, argc, argv};
+    gsl_set_error_handler_off();    /* every program starts here; GSL is to report by status */
     c->max_memory = physical_memory();
     c->argv = calloc((size_t)argc + 2, sizeof *c->argv);
     if (!c->argv)

@@ -4,6 +4,7 @@
  * coordinates are shifted by one (FITS counts from 1).
  */
 #include "sky.h"
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +19,7 @@ enum { PART = 256 };
 
 struct sky {
     int nwcs;
-    struct wcsprm *all;        /* as wcspih made them */
+    struct wcsprm *all;        /* as wcspih made them; NULL for a plain TAN */
     struct wcsprm two;         /* the two celestial axes of the primary one */
     int has_two;
     double scale;
@@ -71,16 +72,76 @@ static int parse(struct sky *s, const struct header *h, struct err *e)
     return OK;
 }
 
-/* Set up the primary WCS and reduce it to its two celestial axes. */
-static int set_up(struct sky *s, struct err *e)
+/* A card whose keyword may change a plain TAN map: distortion, other poles, rotations, units. */
+static int beyond_plain(const char *card)
+{
+    static const char *const numbered[] = {"PV", "PC", "PS", "CROTA", "CDELT", "CPDIS", "CQDIS", "DP", "DQ", "DVERR"};
+    static const char *const other[] = {"LONPOLE", "LATPOLE", "WCSAXES", "A_", "B_", "AP_", "BP_"};
+    if (strncmp(card, "CUNIT", 5) == 0)
+        return !strstr(card, "'deg");
+    for (size_t i = 0; i < sizeof numbered / sizeof *numbered; i++) {
+        size_t n = strlen(numbered[i]);
+        if (strncmp(card, numbered[i], n) == 0 && isdigit((unsigned char)card[n]))
+            return 1;
+    }
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++)
+        if (strncmp(card, other[i], strlen(other[i])) == 0)
+            return 1;
+    return 0;
+}
+
+/*
+ * The TAN with CD that this project writes, put into wcslib's struct by hand:
+ * the scanners behind wcspih end the program when memory does.  E_MISSING when
+ * the header says anything else.
+ */
+static int parse_plain(struct sky *s, const struct header *h)
+{
+    static const char *const cd[4] = {"CD1_1", "CD1_2", "CD2_1", "CD2_2"};
+    char ctype[2][72];
+    double v[8];
+    for (size_t i = 0; i < h->n; i++)
+        if (beyond_plain(h->card[i]))
+            return E_MISSING;
+    if (header_str(h, "CTYPE1", ctype[0], sizeof ctype[0]) || header_str(h, "CTYPE2", ctype[1], sizeof ctype[1]) ||
+        strcmp(ctype[0], "RA---TAN") || strcmp(ctype[1], "DEC--TAN") || header_double(h, "CRPIX1", &v[0]) ||
+        header_double(h, "CRPIX2", &v[1]) || header_double(h, "CRVAL1", &v[2]) || header_double(h, "CRVAL2", &v[3]))
+        return E_MISSING;
+    for (int i = 0; i < 4; i++)
+        if (header_double(h, cd[i], &v[4 + i]))
+            return E_MISSING;
+    s->two.flag = -1;
+    if (wcsinit(1, 2, &s->two, 0, 0, 0))
+        return E_NOMEM;
+    s->has_two = 1;
+    for (int i = 0; i < 2; i++) {
+        memcpy(s->two.ctype[i], ctype[i], sizeof ctype[i]);
+        s->two.crpix[i] = v[i];
+        s->two.crval[i] = v[2 + i];
+    }
+    memcpy(s->two.cd, v + 4, 4 * sizeof *v);
+    s->two.altlin = 2;
+    return OK;
+}
+
+/* wcslib would put 1 degree where a row of CD is zero. */
+static int zero_row(const struct wcsprm *w)
+{
+    for (int i = 0; i < 2 && (w->altlin & 2) && w->naxis == 2; i++)
+        if (w->cd[2 * i] == 0 && w->cd[2 * i + 1] == 0)
+            return 1;
+    return 0;
+}
+
+/* Set up the primary WCS that wcspih found and reduce it to its two celestial axes. */
+static int reduce(struct sky *s, struct err *e)
 {
     int axes[2] = {WCSSUB_LONGITUDE, WCSSUB_LATITUDE}, two = 2;
     struct wcsprm *w = s->nwcs > 0 ? s->all : NULL;
     if (!w || w->naxis < 2)
         return E_MISSING;
-    for (int i = 0; i < 2 && (w->altlin & 2) && w->naxis == 2; i++)
-        if (w->cd[2 * i] == 0 && w->cd[2 * i + 1] == 0)    /* wcslib would put 1 degree here */
-            return err_set(e, E_DATA, "WCS: the CD matrix is singular");
+    if (zero_row(w))
+        return err_set(e, E_DATA, "WCS: the CD matrix is singular");
     (void)unitfix(0, w);                      /* old spellings of degree; the rest wcsset refuses */
     int st = wcsset(w);
     if (st)
@@ -96,11 +157,18 @@ static int set_up(struct sky *s, struct err *e)
     s->has_two = 1;
     if (st)
         return wcs_failed(e, &s->two, "WCS", st);
-    if (two != 2)
-        return E_MISSING;
-    st = wcsset(&s->two);
-    if (st)
+    return two == 2 ? OK : E_MISSING;
+}
+
+static int set_up(struct sky *s, struct err *e)
+{
+    if (zero_row(&s->two))
+        return err_set(e, E_DATA, "WCS: the CD matrix is singular");
+    int st = wcsset(&s->two);
+    if (st) {
+        s->has_two = st != WCSERR_MEMORY;     /* wcslib 7.12 then frees some of it twice */
         return wcs_failed(e, &s->two, "WCS", st);
+    }
     const double *pc = s->two.pc, *d = s->two.cdelt;
     double det = d[0] * d[1] * (pc[0] * pc[3] - pc[1] * pc[2]);
     s->scale = sqrt(fabs(det)) * 3600;
@@ -116,7 +184,14 @@ int sky_open(struct sky **out, const struct header *h, struct err *e)
     if (!s)
         return err_set(e, E_NOMEM, "out of memory");
     wcserr_enable(1);
-    int st = parse(s, h, e);
+    int st = parse_plain(s, h);
+    if (st == E_MISSING) {
+        st = parse(s, h, e);
+        if (st == OK)
+            st = reduce(s, e);
+    } else if (st) {
+        err_set(e, st, "%s", err_text(st));
+    }
     if (st == OK)
         st = set_up(s, e);
     if (st == E_MISSING) {
