@@ -297,6 +297,5 @@ int main(int argc, char **argv)
         report(&w.counts, w.name);
     free(record);
     fits_in_close(w.in);
-    free(c.argv);
     return EXIT_DONE;
 }

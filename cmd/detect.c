@@ -444,7 +444,6 @@ int main(int argc, char **argv)
     free(diameter);
     free(o.apertures.v);
     free(o.checks.v);
-    free(c.argv);
     free(f.map);
     sky_close(f.sky);
     image_free(&f.im);

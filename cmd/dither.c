@@ -165,6 +165,5 @@ int main(int argc, char **argv)
     free(record);
     header_free(&w.x.hdr);
     fits_in_close(w.in);
-    free(c.argv);
     return EXIT_DONE;
 }

@@ -760,6 +760,5 @@ int main(int argc, char **argv)
     if (r->weights.n && r->weights.n != (size_t)c.argc)
         die(EXIT_USAGE, "--weight was given %zu times for %d operands", r->weights.n, c.argc);
     run(&w, &prog, own);
-    free(c.argv);
     return EXIT_DONE;
 }

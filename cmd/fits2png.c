@@ -202,6 +202,5 @@ int main(int argc, char **argv)
     }
     fits_in_close(v.f);
     free(crop.v);
-    free(c.argv);
     return EXIT_DONE;
 }

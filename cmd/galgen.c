@@ -435,7 +435,6 @@ int main(int argc, char **argv)
     if (c.check) {
         models_free(&library);
         table_free(&models);
-        free(c.argv);
         return EXIT_DONE;
     }
     char *record = opt_record(&prog, own, &c);
@@ -454,6 +453,5 @@ int main(int argc, char **argv)
     models_free(&library);
     table_free(&models);
     table_free(&scene);
-    free(c.argv);
     return EXIT_DONE;
 }

@@ -293,6 +293,5 @@ int main(int argc, char **argv)
         free(record);
     }
     otf_free(&bare);
-    free(c.argv);
     return EXIT_DONE;
 }

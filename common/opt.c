@@ -440,9 +440,7 @@ void opt_parse(const struct program *prog, const struct opt *own, struct common 
     struct parser p = {prog, own, c, argc, argv};
     gsl_set_error_handler_off();    /* every program starts here; GSL is to report by status */
     c->max_memory = physical_memory();
-    c->argv = calloc((size_t)argc + 2, sizeof *c->argv);
-    if (!c->argv)
-        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    c->argv = (const char **)argv + 1;    /* operands move to the front of the array */
     int options = 1;
     for (int i = 1; i < argc; i++) {
         const char *word = argv[i];
