@@ -386,7 +386,7 @@ static void quote(char *out, const char *v, size_t n, const char *end)
             *out++ = '\'';
         *out++ = v[i];
     }
-    strcpy(out, end);
+    memcpy(out, end, strlen(end) + 1);
 }
 
 int header_set_str(struct header *h, const char *key, const char *v, const char *comment)
@@ -401,7 +401,7 @@ int header_set_str(struct header *h, const char *key, const char *v, const char 
         size_t len = strlen(value);
         while (len < 9)                       /* at least eight characters in quotes */
             value[len++] = ' ';
-        strcpy(value + len, "'");
+        memcpy(value + len, "'", 2);
         if ((size_t)n + strlen(value) > WIDTH)
             quote(value, v, strlen(v), "'");
         return set(h, key, value, 1, comment);
