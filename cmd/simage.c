@@ -33,7 +33,8 @@ struct request {
     int order;               /* 0: exact */
     long subpixel;
     double exptime, zeropoint;
-    double diffusion;
+    double diffusion, jitter, ipc;
+    double box[2];           /* arcsec, of the pixel's response; 0: the pixel */
     double centre[2];        /* deg */
     int no_pixel;
     struct psf_options psf_options;
@@ -47,7 +48,7 @@ struct input {
     struct scene scene;
     struct otf otf;
     struct psf_info psf;
-    double fwhm;             /* of PSF and diffusion, arcsec; NaN without a PSF */
+    double fwhm;             /* of PSF, jitter and diffusion, arcsec; NaN without a PSF */
 };
 
 static void check(int st)
@@ -62,8 +63,13 @@ static void check_options(const struct request *r, const struct opt *own, const 
         die(EXIT_USAGE, "how large are the pixels? Give -x ARCSEC");
     if (!(hypot(r->shear[0], r->shear[1]) < 1))
         die(EXIT_USAGE, "--shear %g,%g: a reduced shear is below 1", r->shear[0], r->shear[1]);
-    if (r->diffusion > 0 && !r->psf)
-        die(EXIT_USAGE, "--diffusion needs a PSF: give -p FILE");
+    const double needs[] = {r->diffusion, r->jitter, r->ipc, r->box[0]};
+    static const char *const name[] = {"diffusion", "jitter", "ipc", "pixel"};
+    for (int i = 0; i < 4; i++)
+        if (needs[i] > 0 && !r->psf)
+            die(EXIT_USAGE, "--%s needs a PSF: give -p FILE", name[i]);
+    if (r->box[0] > 0 && r->no_pixel)
+        die(EXIT_USAGE, "--pixel and --no-pixel: give one");
     if (opt_given(own, c, "size") && (r->size[0] != floor(r->size[0]) || r->size[1] != floor(r->size[1])))
         die(EXIT_USAGE, "--size %g,%g: whole numbers of pixels, please", r->size[0], r->size[1]);
 }
@@ -99,15 +105,20 @@ static void read_psf(struct input *in, const struct request *r, const struct com
     if (r->diffusion > 0 && in->otf.chdiff > 0)
         die(EXIT_RUN, "%s: charge diffusion of %g\" is in the PSF already (CHDIFF): leave --diffusion out or make the PSF "
             "with psfgen --diffusion 0", r->psf, in->otf.chdiff);
+    if (in->otf.pixel > 0 && r->box[0] > 0)
+        die(EXIT_RUN, "%s: a pixel of %g\" is in the PSF already (PIXRESP): leave --pixel out", r->psf, in->otf.pixel);
     if (in->otf.pixel > 0 && !r->no_pixel && fabs(in->otf.pixel / v->pixel - 1) > 1e-6)
         die(EXIT_RUN, "%s: a pixel of %g\" is in the PSF already (PIXRESP): it does not fit pixels of %g\"; make one "
             "with psfgen without --pixel", r->psf, in->otf.pixel, v->pixel);
     v->psf = &in->otf;
-    v->diffusion = r->diffusion;
+    v->diffusion = hypot(r->diffusion, r->jitter);
+    v->ipc = r->ipc;
+    v->pitch = r->pixel;
+    memcpy(v->box, r->box, sizeof v->box);
     v->no_pixel = r->no_pixel || in->otf.pixel > 0;
-    if (r->diffusion == 0 && isfinite(in->psf.fwhm))
+    if (v->diffusion == 0 && isfinite(in->psf.fwhm))
         in->fwhm = in->psf.fwhm;
-    else if (in->otf.n > 0 && psf_fwhm(&in->otf, r->diffusion, 0, &in->fwhm))
+    else if (in->otf.n > 0 && psf_fwhm(&in->otf, v->diffusion, 0, &in->fwhm))
         in->fwhm = NAN;
 }
 
@@ -158,8 +169,14 @@ static int describe(struct header *h, const struct input *in, const struct reque
         if (st == OK)
             st = header_set_double(h, "CHDIFF", in->otf.chdiff + r->diffusion, "charge diffusion, rms, arcsec");
     }
+    if (st == OK && r->jitter > 0)
+        st = header_set_double(h, "JITTER", r->jitter, "motion of the line of sight, rms, arcsec");
+    if (st == OK && r->ipc > 0)
+        st = header_set_double(h, "IPC", r->ipc, "charge to each of four neighbour pixels");
+    for (int i = 0; i < 2 && st == OK && r->box[0] > 0; i++)
+        st = header_set_double(h, i ? "PIXSIZE2" : "PIXSIZE1", r->box[i], "side of the pixel's response, arcsec");
     if (st == OK)
-        st = header_set_bool(h, "PIXRESP", !v->no_pixel || in->otf.pixel > 0, "the square pixel is in");
+        st = header_set_bool(h, "PIXRESP", !v->no_pixel || in->otf.pixel > 0, "the pixel is in");
     if (st == OK)
         st = sky_set_tan(h, v->pixel, 0.5 * ((double)v->nx + 1), 0.5 * ((double)v->ny + 1), r->centre[0], r->centre[1]);
     return st;
@@ -200,8 +217,8 @@ static void print_plan(FILE *f, const struct plan *p, const struct request *r)
                                                  "mapped pixels (Gauss-Legendre)", "Fourier stamps"};
     const struct view *v = &p->view;
     fprintf(f, "simage: %ld x %ld pixels of %g\", %zu parts\n", v->nx, v->ny, v->pixel, p->n);
-    fprintf(f, "simage: effects:%s%s%s%s\n", v->psf ? " PSF" : "", v->diffusion > 0 ? " diffusion" : "",
-            v->no_pixel ? "" : " pixel", r->shear[0] != 0 || r->shear[1] != 0 ? " shear" : "");
+    fprintf(f, "simage: effects:%s%s%s%s%s%s\n", v->psf ? " PSF" : "", r->diffusion > 0 ? " diffusion" : "",
+            r->jitter > 0 ? " jitter" : "", r->ipc > 0 ? " IPC" : "", v->no_pixel ? "" : " pixel", r->shear[0] != 0 || r->shear[1] != 0 ? " shear" : "");
     for (int i = 0; i < PATH_COUNT; i++)
         if (p->count[i])
             fprintf(f, "simage: %zu %s\n", p->count[i], path[i]);
@@ -319,6 +336,9 @@ int main(int argc, char **argv)
         {"floor", 0, OPT_REAL, &r.accuracy.floor, 0, 1e12, "E", "pixel error allowed always, electrons", 0, 0},
         {"no-pixel", 0, OPT_FLAG, &r.no_pixel, 0, 0, 0, "values at pixel centres, not integrals", 0, 0},
         {"diffusion", 0, OPT_REAL, &r.diffusion, 0, 1e3, "ARCSEC", "charge diffusion on top of the PSF, rms", 0, 0},
+        {"jitter", 0, OPT_REAL, &r.jitter, 0, 1e3, "ARCSEC", "motion of the line of sight, rms per axis", 0, 0},
+        {"ipc", 0, OPT_REAL, &r.ipc, 0, 0.2, "A", "charge shared with each of four neighbours", 0, 0},
+        {"pixel", 0, OPT_PAIR, r.box, 1e-9, 1e6, "W,H", "sides of the pixel's response, arcsec", 0, 0},
         {"center", 0, OPT_PAIR, r.centre, -360, 360, "RA,DEC", "sky position of the field centre, deg", 0, 0},
         {"set", 0, OPT_STR, &r.set, 0, 0, "NAME", "name of the set, keyword SETNAME", 0, 0},
         {"psf-scale", 0, OPT_REAL, &r.psf_options.scale, 1e-9, 1e6, "ARCSEC", "sampling of the PSF, over its header", 0, 0},

@@ -401,3 +401,9 @@ void otf_box(int n, const double *u, double width, double *f)
             f[i] *= sin(t) / t;
     }
 }
+
+void otf_neighbours(int n, const double *u, double pitch, double *c)
+{
+    for (int i = 0; i < n; i++)
+        c[i] = 2 * cos(2 * M_PI * u[i] * pitch);
+}

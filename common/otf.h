@@ -71,5 +71,7 @@ MUST_CHECK int otf_from_samples(int nx_p, int ny_p, const double *p, double scal
 /* exp(-2 pi^2 sigma^2 u^2), 1 for sigma = 0, and sin(pi u w)/(pi u w): 1-D factors, f[i] *= ... */
 void otf_diffusion(int n, const double *u, double sigma, double *f);
 void otf_box(int n, const double *u, double width, double *f);
+/* c[i] = 2 cos(2 pi u pitch): transform of two points, pitch to either side. */
+void otf_neighbours(int n, const double *u, double pitch, double *c);
 
 #endif

@@ -233,7 +233,7 @@ static int plan_fourier(struct maker *m, const struct emitter *s, const struct l
     if (s->coef) {
         double core = w->core / (l->beta * l->stretch);
         size = 0.9 / sqrt(4 * M_PI * l->power);   /* rms of a Gaussian of that power, and a margin */
-        own = own_reach(m, s, l) * sqrt(1 + core * core);
+        own = own_reach(m, s, l) * sqrt(1 + core * core) + (p->view.ipc > 0 ? p->view.pitch : 0);
     }
     int side = 0, good;
     for (;; side++) {
@@ -379,11 +379,22 @@ static int finish_orders(struct maker *m)
     return shapelet_rotation_table(turned, p->rotation);
 }
 
+/* What the detector does to the light, of the view. */
+static struct stamp_response response_of(const struct view *v)
+{
+    struct stamp_response r = {.diffusion = v->diffusion, .ipc = v->ipc, .pitch = v->pitch};
+    if (!v->no_pixel) {
+        r.box = v->box[0] > 0 ? v->box[0] : v->pixel;
+        r.box_y = v->box[1];
+    }
+    return r;
+}
+
 /* Tables of the side classes in use; draw.grid becomes their numbers. */
 static int finish_grids(struct maker *m)
 {
     struct plan *p = m->p;
-    const struct stamp_response r = {p->view.diffusion, p->view.no_pixel ? 0 : p->view.pixel};
+    const struct stamp_response r = response_of(&p->view);
     p->grid = calloc(SIDES, sizeof *p->grid);
     if (!p->grid)
         return E_NOMEM;
@@ -417,7 +428,7 @@ static int make(struct maker *m)
     }
     int st = envelope_new(&m->env, nmax);
     if (st == OK && p->view.psf) {
-        const struct stamp_response r = {p->view.diffusion, p->view.no_pixel ? 0 : p->view.pixel};
+        const struct stamp_response r = response_of(&p->view);
         st = wings_new(&p->wings, p->view.psf, &r, p->view.pixel);
         p->fft_plans++;
     }
@@ -448,7 +459,9 @@ int scene_plan(struct plan *p, const struct view *v, const struct accuracy *a, s
 {
     if (v->nx < 1 || v->ny < 1 || v->nx > 65535 || v->ny > 65535 || !(v->pixel > 0) || !isfinite(v->pixel)
         || !(hypot(v->g1, v->g2) < 1) || v->shear_order < 0 || v->shear_order > 8 || !(a->eps > 0)
-        || !(a->floor >= 0) || !(v->diffusion >= 0) || (v->diffusion > 0 && !v->psf))
+        || !(a->floor >= 0) || !(v->diffusion >= 0) || !(v->ipc >= 0) || !(v->pitch >= 0)
+        || !(v->box[0] >= 0) || !(v->box[1] >= 0)
+        || ((v->diffusion > 0 || v->ipc > 0 || v->box[0] > 0 || v->box[1] > 0) && !v->psf))
         return E_RANGE;
     struct plan made = {.view = *v, .acc = *a, .n = n, .emitter = emitter, .rotation_nmax = -1};
     struct maker m = {.p = &made};

@@ -38,6 +38,9 @@ struct view {
     double pixel;          /* arcsec */
     int no_pixel;          /* values at pixel centres times pixel^2 instead of integrals */
     double diffusion;      /* sigma of charge diffusion beyond what psf holds, arcsec; needs psf */
+    double box[2];         /* sides of the pixel's response, arcsec; 0: the pixel; needs psf */
+    double ipc;            /* charge to each of four neighbours, pitch arcsec away; needs psf */
+    double pitch;
     const struct otf *psf; /* NULL: none */
     double g1, g2;         /* field shear, reduced */
     int shear_order;       /* 0: exact; 1..8: series of that order */

@@ -47,7 +47,8 @@ static double *axis_factors(const struct otf *t, double diffusion, double pixel,
         u[i] = (i - n / 2) * du;
         f[i] = fabs(u[i]) <= t->ucut * (1 + 1e-12);
     }
-    otf_diffusion(n, u, diffusion, f);
+    if (diffusion > 0)
+        otf_diffusion(n, u, diffusion, f);
     if (pixel > 0)
         otf_box(n, u, pixel, f);
     return f;

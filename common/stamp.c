@@ -97,19 +97,44 @@ double stamp_grid_bytes(double ucut, double pixel, int n, int complex_t)
     return (complex_t ? 2 : 1) * 8.0 * 2 * k * (k + LANES);
 }
 
-/* Multiply rows and columns of the table by the one-dimensional factors f. */
-static void apply_factors(struct stamp_grid *g, const double *f)
+/* Multiply rows by y and columns by x, and all by 1 + ipc (cx[column] + cx[row] - 4), cx = 2 cos. */
+static void apply_factors(struct stamp_grid *g, const double *x, const double *y, double ipc, const double *cx)
 {
     for (int row = 0; row <= 2 * g->kmax; row++) {
-        double fy = f[abs(row - g->kmax)];
+        const int j = abs(row - g->kmax);
         double *re = g->t_re + (size_t)row * (size_t)g->ld;
         double *im = g->t_im ? g->t_im + (size_t)row * (size_t)g->ld : NULL;
         for (int i = 0; i <= g->kmax; i++) {
-            re[i] *= fy * f[i];
+            double f = y[j] * x[i];
+            if (ipc > 0)
+                f *= 1 + ipc * (cx[i] + cx[j] - 4);
+            re[i] *= f;
             if (im)
-                im[i] *= fy * f[i];
+                im[i] *= f;
         }
     }
+}
+
+/* The factors beyond the PSF; u: 0..kmax du, f: 3 (kmax + 1) of scratch. */
+static void factors(struct stamp_grid *g, const struct stamp_response *r, const double *u, double *f)
+{
+    const int n = g->kmax + 1, tall = r->box_y > 0;
+    double *x = f, *y = tall ? f + n : f, *c = f + 2 * n;
+    if (!(r->diffusion > 0) && !(r->box > 0) && !tall && !(r->ipc > 0))
+        return;
+    for (int i = 0; i < n; i++)
+        x[i] = y[i] = 1;
+    if (r->diffusion > 0)
+        otf_diffusion(n, u, r->diffusion, x);
+    if (tall)
+        memcpy(y, x, (size_t)n * sizeof *y);
+    if (r->box > 0)
+        otf_box(n, u, r->box, x);
+    if (tall)
+        otf_box(n, u, r->box_y, y);
+    if (r->ipc > 0)
+        otf_neighbours(n, u, r->pitch, c);
+    apply_factors(g, x, y, r->ipc, c);
 }
 
 /* Fill t_re, t_im from the PSF's table; u holds the 2 kmax + 1 frequencies from -kmax du. */
@@ -129,14 +154,7 @@ static int tabulate(struct stamp_grid *g, const struct otf *t, const struct stam
             memcpy(g->t_im + (size_t)row * (size_t)g->ld, im + (size_t)row * (size_t)(k + 1),
                    (size_t)(k + 1) * sizeof *im);
     }
-    for (int i = 0; i <= k; i++)
-        f[i] = 1;
-    if (r->diffusion > 0)
-        otf_diffusion(k + 1, u + k, r->diffusion, f);
-    if (r->box > 0)
-        otf_box(k + 1, u + k, r->box, f);
-    if (r->diffusion > 0 || r->box > 0)
-        apply_factors(g, f);
+    factors(g, r, u + k, f);
     return OK;
 }
 
@@ -144,13 +162,13 @@ int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp
                    int n)
 {
     if (n < 4 || n > 4096 || n % 2 || !(pixel > 0) || !(t->ucut > 0) || !(t->ucut * pixel < 64) ||
-        !(r->diffusion >= 0) || !(r->box >= 0))
+        !(r->diffusion >= 0) || !(r->box >= 0) || !(r->box_y >= 0) || !(r->ipc >= 0) || !(r->pitch >= 0))
         return E_RANGE;
     struct stamp_grid s = {.n = n, .pixel = pixel, .du = 1 / (n * pixel)};
     s.kmax = last_frequency(t->ucut, pixel, n);
     s.ld = (int)round8((size_t)s.kmax + 1);
     size_t rows = 2 * (size_t)s.kmax + 1, cols = (size_t)s.kmax + 1;
-    double *tmp = malloc((2 * rows * cols + rows + cols) * sizeof *tmp);
+    double *tmp = malloc((2 * rows * cols + rows + 3 * cols) * sizeof *tmp);
     s.t_re = calloc(rows * (size_t)s.ld, sizeof *s.t_re);
     const int real = otf_is_real(t);
     s.t_im = real ? NULL : calloc(rows * (size_t)s.ld, sizeof *s.t_im);

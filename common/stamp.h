@@ -53,7 +53,10 @@ struct stamp_grid {
 /* Factors of the transfer function beyond the PSF, arcsec; 0 leaves the factor out. */
 struct stamp_response {
     double diffusion;      /* sigma of a Gaussian */
-    double box;            /* side of the square pixel */
+    double box;            /* side of the pixel along x, and along y when box_y is 0 */
+    double box_y;          /* side along y */
+    double ipc;            /* charge that each of the four neighbours, pitch away, gets: 1 - 4 ipc stays */
+    double pitch;
 };
 
 /* Tabulate; n even, 4..4096. E_RANGE, E_NOMEM. */

@@ -125,7 +125,7 @@ static double error_of(const struct plan *p, size_t i, struct stamp_work *w, dou
     int st = OK, height = wide;
     if (v->psf) {
         struct stamp_grid g;
-        const struct stamp_response r = {v->diffusion, v->pixel};
+        const struct stamp_response r = {.diffusion = v->diffusion, .box = v->pixel};
         st = stamp_grid_new(&g, v->psf, &r, v->pixel, wide);
         if (!st)
             st = stamp_fourier(&g, w, &shape, x, y, p->emitter[i].flux, 1e9, big);

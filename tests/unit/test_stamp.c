@@ -192,8 +192,10 @@ static void by_sum(const struct otf *t, const struct stamp_response *r, const st
             double f = exp(-2 * PI * PI * r->diffusion * r->diffusion * (ux * ux + uy * uy));
             if (r->box > 0 && kx)
                 f *= sin(PI * ux * r->box) / (PI * ux * r->box);
-            if (r->box > 0 && ky)
-                f *= sin(PI * uy * r->box) / (PI * uy * r->box);
+            const double tall = r->box_y > 0 ? r->box_y : r->box;
+            if (tall > 0 && ky)
+                f *= sin(PI * uy * tall) / (PI * uy * tall);
+            f *= 1 - 4 * r->ipc + 2 * r->ipc * cos(2 * PI * ux * r->pitch) + 2 * r->ipc * cos(2 * PI * uy * r->pitch);
             double complex g = transform(s, ux, uy, (re + I * im) * f);
             for (int k = 0; k < m; k++)
                 out[k] += creal(g * cexp(2 * PI * I * (kx * (at[k][0] - x) + ky * (at[k][1] - y)) / n));
@@ -214,12 +216,13 @@ static void with_psf(struct stamp_work *w)
                          {.nmax = 5, .beta_x = 0.12, .beta_y = 0.12, .coef = c, .mapped = 1}};
     if (shear_matrix(0.2, 0.3, s[3].a))
         exit(1);
-    struct check k = check_begin("Fourier stamp = sum over all frequencies: star, galaxy, two scales, map; of the peak");
+    struct check k = check_begin("Fourier stamp = sum over all frequencies: star, galaxy, two scales, map; rectangle and neighbours; of the peak");
     for (int odd = 0; odd < 2; odd++)
         for (int b = 0; b < 3; b++) {
             struct otf t = {0};
             struct stamp_grid g = {0};
-            const struct stamp_response r = {odd ? 0.04 : 0, scale[b]};
+            const struct stamp_response r = {.diffusion = odd ? 0.04 : 0, .box = scale[b], .box_y = b == 1 ? 0.7 * scale[b] : 0,
+                                             .ipc = b > 0 ? 0.01 : 0, .pitch = b == 2 ? 2 * scale[b] : scale[b]};
             telescope(&t, odd);
             if (stamp_grid_new(&g, &t, &r, scale[b], n))
                 exit(1);
@@ -245,7 +248,7 @@ static void identities(struct stamp_work *w)
     struct otf t = {0};
     struct stamp_grid full = {0}, half = {0};
     telescope(&t, 1);
-    const struct stamp_response r = {0.04, 0.1}, rh = {0.04, 0.05};
+    const struct stamp_response r = {.diffusion = 0.04, .box = 0.1}, rh = {.diffusion = 0.04, .box = 0.05};
     const int n = 32;
     double *c = galaxy(8, 0.1), *a = fft_alloc((size_t)(n * n) * sizeof *a), *b = fft_alloc((size_t)(4 * n * n) * sizeof *b);
     struct shape s = {.nmax = 8, .beta_x = 0.1, .beta_y = 0.1, .coef = c};
@@ -339,7 +342,7 @@ static double truth_one(struct stamp_work *w, const char *name, const struct otf
     int n = 64, shift = 0;
     if (st == OK && t) {
         struct stamp_grid grid = {0};
-        const struct stamp_response r = {0, scale};
+        const struct stamp_response r = {.box = scale};
         n = 256, shift = 96;
         st = stamp_grid_new(&grid, t, &r, scale, n);
         if (st == OK)
