@@ -24,7 +24,7 @@ PKG_L    = $(eval PKG_L := $$(shell pkg-config --libs $(LIBS) 2>/dev/null))$(PKG
 
 # Same bits from every compiler and processor: no contraction, no fast-math.
 ALL_C    = -std=c11 -D_GNU_SOURCE -DPIXSHEAR_VERSION='"$(VERSION)"' -Icommon $(PKG_C) \
-           $(CFLAGS) -ffp-contract=off -pthread $(WARN) $(WERROR) $(SAN)
+           $(CFLAGS) -ffp-contract=off -fno-math-errno -pthread $(WARN) $(WERROR) $(SAN)
 ALL_L    = $(LDFLAGS) $(SAN) $(PKG_L) -lm -pthread
 
 PROGRAMS := $(patsubst cmd/%.c,%,$(wildcard cmd/*.c))

@@ -2,7 +2,7 @@
  * background.c - sky level and noise on meshes; see background.h.
  *
  * Each cell is copied once into a buffer that stays in cache.  Clipped sums of
- * a sample of it set the range of a histogram of 1024 bins over +-5 sigma; the
+ * a sample of it set the range of a histogram of 1024 bins over +-5 of that rms; the
  * clipping about the median and the final median, mean and rms are looked up in
  * the histogram's running sums.  Whole-numbered data get bins of whole width,
  * so that a bin never holds more numbers than its neighbour.
@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BINS = 1024, SAMPLE = 1024, LANES = 8 };
+enum { BINS = 1024, SAMPLE = 512, LANES = 8 };
 
 /* Counts, and running sums below each edge: number, sum of k, sum of k^2. */
 struct histogram {
@@ -52,8 +52,15 @@ static void rough(const float *v, long n, double pivot, double *centre, double *
     double t[SAMPLE + LANES], c = 0, reach = INFINITY, s = 0;
     long m = n < SAMPLE ? n : SAMPLE;
     *whole = 1;
-    for (long i = 0; i < m; i++) {
-        float p = v[(size_t)i * (size_t)n / (size_t)m];
+    long step = n / m, rest = n % m, at = 0, over = 0;
+    for (long i = 0; i < m; i++) {         /* at = i n / m */
+        float p = v[at];
+        at += step;
+        over += rest;
+        if (over >= m) {
+            over -= m;
+            at++;
+        }
         t[i] = (double)p - pivot;
         *whole &= fabsf(p) < 8388608.0f && (float)(int)p == p;
     }
@@ -382,11 +389,15 @@ static int mesh_new(struct mesh *m, const struct image *im, long mx, long my, co
 {
     size_t n = (size_t)mx * (size_t)my, side = (size_t)(mx > my ? mx : my);
     double *node = malloc(4 * n * sizeof *node), *w = malloc(side * sizeof *w);
-    if (!node || !w) {
+    long *first = malloc(((size_t)mx + 1) * sizeof *first);
+    if (!node || !w || !first) {
         free(node);
         free(w);
+        free(first);
         return E_NOMEM;
     }
+    for (long k = 0; k <= mx; k++)
+        first[k] = (long)ceil(((double)k + 0.5) * (double)im->nx / (double)mx - 0.5);
     double *dx = node + n, *dy = node + 2 * n, *dxy = node + 3 * n;
     for (size_t i = 0; i < n; i++)
         node[i] = v[i] - pivot;
@@ -397,7 +408,7 @@ static int mesh_new(struct mesh *m, const struct image *im, long mx, long my, co
         natural(dx + i, my, mx, dxy + i, w);
     }
     free(w);
-    *m = (struct mesh){im->nx, im->ny, mx, my, pivot, node, NULL};
+    *m = (struct mesh){im->nx, im->ny, mx, my, pivot, node, first, NULL};
     return OK;
 }
 
@@ -410,24 +421,37 @@ static void cubic(double v0, double v1, double a, double b, double c[4])
     c[3] = (b - a) / 6;
 }
 
-/* Value and x second derivative of column k at row coordinate t (nodes), into v[0..1]. */
-static void column_at(const struct mesh *m, long k, double t, double v[2])
+/* Where a pixel row lies between the rows of nodes. */
+struct place {
+    long j;                /* node row below */
+    double u;              /* distance from it, nodes */
+    int outside;           /* -1 below the first, 1 above the last, else 0 */
+};
+
+static struct place place_of(const struct mesh *m, long y)
+{
+    double t = ((double)y + 0.5) * (double)m->my / (double)m->ny - 0.5;
+    long j = (long)floor(t);
+    j = j < 0 ? 0 : j > m->my - 2 ? m->my - 2 : j;
+    return (struct place){j, t - (double)j, t < 0 ? -1 : t > (double)(m->my - 1) ? 1 : 0};
+}
+
+/* Value and x second derivative of column k at a pixel row, into v[0..1]. */
+static void column_at(const struct mesh *m, long k, struct place p, double v[2])
 {
     size_t n = (size_t)m->mx * (size_t)m->my;
-    long j = (long)floor(t);
-    int outside = t < 0 ? -1 : t > (double)(m->my - 1) ? 1 : 0;
-    j = j < 0 ? 0 : j > m->my - 2 ? m->my - 2 : j;
+    long j = p.j;
     for (int part = 0; part < 2; part++) {
         const double *f = m->node + (size_t)part * n + k, *d = f + 2 * n;
         if (m->my == 1) {
             v[part] = f[0];
             continue;
         }
-        double c[4], u = t - (double)j;
+        double c[4], u = p.u;
         cubic(f[j * m->mx], f[(j + 1) * m->mx], d[j * m->mx], d[(j + 1) * m->mx], c);
-        if (outside < 0)
+        if (p.outside < 0)
             v[part] = c[0] + u * c[1];
-        else if (outside > 0)
+        else if (p.outside > 0)
             v[part] = c[0] + c[1] + c[2] + c[3] + (u - 1) * (c[1] + 2 * c[2] + 3 * c[3]);
         else
             v[part] = c[0] + u * (c[1] + u * (c[2] + u * c[3]));
@@ -442,7 +466,7 @@ static void column_of_row(const struct mesh *m, long k, long y, double v[2])
         v[0] = (double)f[0];
         v[1] = (double)f[1];
     } else {
-        column_at(m, k, ((double)y + 0.5) * (double)m->my / (double)m->ny - 0.5, v);
+        column_at(m, k, place_of(m, y), v);
     }
 }
 
@@ -452,13 +476,15 @@ static int mesh_rows(struct mesh *m)
     float *row = malloc(2 * (size_t)m->ny * (size_t)m->mx * sizeof *row);
     if (!row)
         return E_NOMEM;
-    for (long y = 0; y < m->ny; y++)
+    for (long y = 0; y < m->ny; y++) {
+        struct place p = place_of(m, y);
         for (long k = 0; k < m->mx; k++) {
             double v[2];
-            column_of_row(m, k, y, v);
+            column_at(m, k, p, v);
             row[2 * (y * m->mx + k)] = (float)v[0];
             row[2 * (y * m->mx + k) + 1] = (float)v[1];
         }
+    }
     m->row = row;
     return OK;
 }
@@ -473,12 +499,6 @@ WIDE static void polynomial(float t0, float dt, const float c[4], int first, int
     }
 }
 
-/* First pixel whose coordinate in nodes is >= k. */
-static long first_pixel(const struct mesh *m, long k)
-{
-    return (long)ceil(((double)k + 0.5) * (double)m->nx / (double)m->mx - 0.5);
-}
-
 void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
 {
     double h = (double)m->mx / (double)m->nx;
@@ -490,13 +510,16 @@ void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
             out[i] = (float)v[0];
         return;
     }
-    while (x < end) {
-        double t = ((double)x + 0.5) * h - 0.5, v0[2], v1[2], c[4];
-        long k = (long)floor(t + 1e-9);
-        k = k < -1 ? -1 : k > m->mx - 1 ? m->mx - 1 : k;
+    long k = (long)floor(((double)x + 0.5) * h - 0.5 + 1e-9);
+    k = k < -1 ? -1 : k > m->mx - 1 ? m->mx - 1 : k;
+    while (k >= 0 && m->first[k] > x)
+        k--;
+    for (; x < end; k++) {                     /* from node k to the next; -1 and mx - 1 are the lines beyond */
         long i = k < 0 ? 0 : k > m->mx - 2 ? m->mx - 2 : k;
-        long stop = k == m->mx - 1 ? end : first_pixel(m, k + 1);
-        stop = stop > end ? end : stop <= x ? x + 1 : stop;
+        long stop = k == m->mx - 1 || m->first[k + 1] > end ? end : m->first[k + 1];
+        if (stop <= x)
+            continue;
+        double v0[2], v1[2], c[4];
         column_of_row(m, i, y, v0);
         column_of_row(m, i + 1, y, v1);
         cubic(v0[0], v1[0], v0[1], v1[1], c);
@@ -508,7 +531,7 @@ void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
             c[1] = slope;
             c[2] = c[3] = 0;
         }
-        long anchor = k < 0 ? 0 : first_pixel(m, k);
+        long anchor = k < 0 ? 0 : m->first[k];
         float f[4] = {(float)c[0], (float)c[1], (float)c[2], (float)c[3]};
         float start = (float)(((double)anchor + 0.5) * h - 0.5 - (double)i);
         polynomial(start, (float)h, f, (int)(x - anchor), (int)(stop - x), out + (x - x0));
@@ -613,7 +636,9 @@ int background_measure(struct background *b, const struct image *im, const float
 void background_free(struct background *b)
 {
     free(b->level.node);
+    free(b->level.first);
     free(b->level.row);
     free(b->rms.node);
+    free(b->rms.first);
     *b = (struct background){0};
 }

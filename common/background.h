@@ -19,6 +19,7 @@ struct mesh {
     long nx, ny, mx, my;
     double pivot;          /* subtracted from the nodes, exact in float32 */
     double *node;          /* my*mx values minus pivot, owned; then the three derivative tables */
+    long *first;           /* mx + 1: first pixel at or after node k; owned */
     float *row;            /* ny*mx pairs: value and second derivative along x in every pixel row; or NULL */
 };
 

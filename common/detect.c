@@ -253,7 +253,7 @@ static int measure_objects(void *ctx, long begin, long end, int worker)
     struct measuring *t = ctx;
     struct photometry_work *w;
     int st = photometry_work_new(&w);
-    size_t m = 2 * t->f.p->napertures;
+    size_t m = 2 * t->f.p->napertures + t->f.p->nfractions;
     for (long i = begin; i < end && !st; i++)
         st = photometry_measure(&t->f, &t->all->blob[i], (int32_t)i, w, &t->d->object[i],
                                 m ? t->d->aperture + (size_t)i * m : NULL);
@@ -269,7 +269,7 @@ static int measure_all(const struct image *im, const float *map, const struct de
     phot.rms_map = map;
     d->n = all->n;
     d->object = malloc((all->n + 1) * sizeof *d->object);
-    d->aperture = malloc((all->n * 2 * phot.napertures + 1) * sizeof *d->aperture);
+    d->aperture = malloc((all->n * (2 * phot.napertures + phot.nfractions) + 1) * sizeof *d->aperture);
     if (!d->object || !d->aperture)
         return E_NOMEM;
     struct measuring t = {{im, &d->background, d->label, &phot}, all, d};

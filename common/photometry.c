@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { LANES = 8 };
 static const double KRON_REACH = 6;        /* ellipse of the Kron radius, rms radii */
 static const double FWHM_SIGMA = 2.3548200450309493;
 
@@ -23,22 +24,24 @@ struct stamp {
     double cx, cy;                         /* the object inside the stamp */
 };
 
-struct ring {                              /* pixels sorted by distance */
-    float v, dx, dy;
-};
-
 struct photometry_work {
     struct stamp stamp;
-    double *line;                          /* one weight per column */
-    struct ring *ring;
-    long *start;
-    size_t cap_v, cap_replaced, cap_line, cap_ring, cap_start;
+    double *line;                          /* weights of columns and rows */
+    struct growth *growth;
+    size_t cap_v, cap_replaced, cap_line;
 };
 
 int photometry_work_new(struct photometry_work **w)
 {
     *w = calloc(1, sizeof **w);
-    return *w ? OK : E_NOMEM;
+    if (!*w)
+        return E_NOMEM;
+    int st = growth_new(&(*w)->growth);
+    if (st) {
+        free(*w);
+        *w = NULL;
+    }
+    return st;
 }
 
 void photometry_work_free(struct photometry_work *w)
@@ -48,8 +51,7 @@ void photometry_work_free(struct photometry_work *w)
     free(w->stamp.v);
     free(w->stamp.replaced);
     free(w->line);
-    free(w->ring);
-    free(w->start);
+    growth_free(w->growth);
     free(w);
 }
 
@@ -76,6 +78,14 @@ static float mirrored(const struct field *f, double cx, double cy, long x, long 
     return v;
 }
 
+WIDE static int all_finite(const float *v, long n)
+{
+    int bad = 0;
+    for (long i = 0; i < n; i++)
+        bad |= !(fabsf(v[i]) <= FLT_MAX);
+    return !bad;
+}
+
 WIDE static int row_is_clean(const float *pix, const int32_t *label, int32_t own, long n)
 {
     int bad = 0;
@@ -94,7 +104,7 @@ static int cut_stamp(const struct field *f, double cx, double cy, double hx, dou
     long x1 = cx + hx < (double)(nx - 1) ? (long)floor(cx + hx) + 1 : nx;
     long y1 = cy + hy < (double)(ny - 1) ? (long)floor(cy + hy) + 1 : ny;
     size_t n = (size_t)(x1 - x0) * (size_t)(y1 - y0);
-    int st = grow(&s->v, &w->cap_v, n, sizeof *s->v);
+    int st = grow(&s->v, &w->cap_v, n + LANES, sizeof *s->v);
     if (!st)
         st = grow(&s->replaced, &w->cap_replaced, n, 1);
     if (st)
@@ -107,6 +117,7 @@ static int cut_stamp(const struct field *f, double cx, double cy, double hx, dou
     s->cy = cy - (double)y0;
     s->any_replaced = 0;
     memset(s->replaced, 0, n);
+    memset(s->v + n, 0, LANES * sizeof *s->v);
     for (long y = y0; y < y1; y++) {
         size_t at = (size_t)y * (size_t)nx + (size_t)x0;
         float *v = s->v + (y - y0) * s->nx;
@@ -155,22 +166,54 @@ static void row_range(const struct stamp *s, const struct ellipse *e, double r, 
     }
 }
 
+/* Adds sums of v and v r over n pixels, r^2 = a dx^2 + b dx + c >= 0 from dx on. */
+WIDE static void kron_row(const float *v, long n, double dx, double a, double b, double c, double out[2])
+{
+    double s[LANES] = {0}, q[LANES] = {0};
+    long whole = n - n % LANES;
+    for (long i = 0; i < whole; i += LANES)
+        for (int j = 0; j < LANES; j++) {
+            double f = (double)v[i + j], x = dx + (double)(i + j), r2 = c + x * (b + x * a);
+            s[j] += f;
+            q[j] += f * sqrt(r2 > 0 ? r2 : 0);
+        }
+    for (long i = whole; i < n; i++) {
+        double f = (double)v[i], x = dx + (double)i, r2 = c + x * (b + x * a);
+        s[0] += f;
+        q[0] += f * sqrt(r2 > 0 ? r2 : 0);
+    }
+    for (int j = 0; j < LANES; j++) {
+        out[0] += s[j];
+        out[1] += q[j];
+    }
+}
+
 /* Kron's first-moment radius in rms radii, from the ellipse of 6; 0 without flux. */
 static double kron_radius(const struct stamp *s, const struct ellipse *e)
 {
-    double sum = 0, sum_r = 0;
+    double sum[2] = {0};
     for (long y = 0; y < s->ny; y++) {
         long a, b;
         row_range(s, e, KRON_REACH, y, &a, &b);
         double dy = (double)y - s->cy;
-        for (long x = a; x < b; x++) {
-            double dx = (double)x - s->cx, v = (double)s->v[y * s->nx + x];
-            double r2 = e->cxx * dx * dx + e->cyy * dy * dy + e->cxy * dx * dy;
-            sum += v;
-            sum_r += v * sqrt(r2 > 0 ? r2 : 0);
-        }
+        if (b > a)
+            kron_row(s->v + y * s->nx + a, b - a, (double)a - s->cx, e->cxx, e->cxy * dy, e->cyy * dy * dy, sum);
     }
-    return sum > 0 && sum_r > 0 ? sum_r / sum : 0;
+    return sum[0] > 0 && sum[1] > 0 ? sum[1] / sum[0] : 0;
+}
+
+WIDE static double sum_of(const float *v, long n)
+{
+    double s[LANES] = {0}, sum = 0;
+    long whole = n - n % LANES;
+    for (long i = 0; i < whole; i += LANES)
+        for (int j = 0; j < LANES; j++)
+            s[j] += (double)v[i + j];
+    for (long i = whole; i < n; i++)
+        sum += (double)v[i];
+    for (int j = 0; j < LANES; j++)
+        sum += s[j];
+    return sum;
 }
 
 struct aperture_sum {
@@ -190,8 +233,8 @@ static struct aperture_sum ellipse_sum(const struct field *f, const struct stamp
         const float *v = s->v + y * s->nx;
         const float *rms = f->p->rms_map
                          ? f->p->rms_map + (size_t)(s->y0 + y) * (size_t)f->im->nx + (size_t)s->x0 : NULL;
-        for (long x = a; x < b; x++)
-            t.flux += (double)v[x];
+        if (b > a)
+            t.flux += sum_of(v + a, b - a);
         for (long x = a; x < b && s->any_replaced; x++)
             t.replaced += s->replaced[y * s->nx + x];
         for (long x = a; rms && x < b; x++)
@@ -210,60 +253,6 @@ static double flux_error(const struct field *f, double variance, double flux)
 }
 
 /* ---- circles ---- */
-
-/* Area of the part of the circle of radius r with 0 <= x <= a, 0 <= y <= b. */
-static double quadrant(double a, double b, double r)
-{
-    if (a <= 0 || b <= 0)
-        return 0;
-    a = a < r ? a : r;
-    b = b < r ? b : r;
-    if (a * a + b * b <= r * r)
-        return a * b;
-    double xb = sqrt(r * r - b * b);       /* the arc leaves the top at xb and ends at a */
-    double arc = 0.5 * (a * sqrt(r * r - a * a > 0 ? r * r - a * a : 0) + r * r * asin(a / r > 1 ? 1 : a / r)
-                        - xb * b - r * r * asin(xb / r));
-    return xb * b + arc;
-}
-
-/* Signed: area of [0,a] x [0,b] inside the circle, negative sides count negative. */
-static double corner(double a, double b, double r)
-{
-    double s = (a < 0 ? -1 : 1) * (b < 0 ? -1 : 1);
-    return s * quadrant(fabs(a), fabs(b), r);
-}
-
-/* Overlap with the pixel whose nearest corner is (x0, y0), both >= 0: the common case, with one arc sine. */
-static double arc_overlap(double x0, double y0, double r)
-{
-    double x1 = x0 + 1, y1 = y0 + 1, r2 = r * r;
-    double a = r2 > y1 * y1 ? sqrt(r2 - y1 * y1) : 0;      /* the arc crosses the top at a and the bottom at b */
-    double b = sqrt(r2 - y0 * y0);
-    a = a > x0 ? a : x0;
-    b = b < x1 ? b : x1;
-    if (!(b > a))
-        return a - x0 < 1 ? a - x0 : 1;
-    double ha = sqrt(r2 - a * a), hb = sqrt(r2 - b * b > 0 ? r2 - b * b : 0);
-    double sine = (b * ha - a * hb) / r2;                  /* of the angle of the arc */
-    return (a - x0) + 0.5 * (b * hb - a * ha + r2 * asin(sine < 1 ? sine : 1)) - y0 * (b - a);
-}
-
-double circle_overlap(double dx, double dy, double r)
-{
-    if (!(r > 0))
-        return 0;
-    dx = fabs(dx);
-    dy = fabs(dy);
-    if ((dx + 0.5) * (dx + 0.5) + (dy + 0.5) * (dy + 0.5) <= r * r)
-        return 1;
-    double nx = dx > 0.5 ? dx - 0.5 : 0, ny = dy > 0.5 ? dy - 0.5 : 0;
-    if (nx * nx + ny * ny >= r * r)
-        return 0;
-    if (dx >= 0.5 && dy >= 0.5)
-        return arc_overlap(dx - 0.5, dy - 0.5, r);
-    return corner(dx + 0.5, dy + 0.5, r) - corner(dx - 0.5, dy + 0.5, r)
-         - corner(dx + 0.5, dy - 0.5, r) + corner(dx - 0.5, dy - 0.5, r);
-}
 
 /* Exact circular aperture of radius r (pixels). */
 static struct aperture_sum circle_sum(const struct field *f, const struct stamp *s, double r)
@@ -288,150 +277,84 @@ static struct aperture_sum circle_sum(const struct field *f, const struct stamp 
     return t;
 }
 
-/* Sort the pixels within `reach` of the object into rings of width 1: start[k]..start[k+1]-1 have floor(r) = k. */
-static int sort_rings(struct photometry_work *w, double reach, long *nring)
-{
-    const struct stamp *s = &w->stamp;
-    long rings = (long)reach + 2;
-    size_t n = (size_t)s->nx * (size_t)s->ny;
-    int st = grow(&w->ring, &w->cap_ring, n, sizeof *w->ring);
-    if (!st)
-        st = grow(&w->start, &w->cap_start, (size_t)rings + 2, sizeof *w->start);
-    if (st)
-        return st;
-    memset(w->start, 0, ((size_t)rings + 2) * sizeof *w->start);
-    double far = (double)rings;
-    long x0 = s->cx > far ? (long)(s->cx - far) : 0, x1 = s->cx + far + 1 < (double)s->nx ? (long)(s->cx + far) + 1 : s->nx;
-    long y0 = s->cy > far ? (long)(s->cy - far) : 0, y1 = s->cy + far + 1 < (double)s->ny ? (long)(s->cy + far) + 1 : s->ny;
-    for (int pass = 0; pass < 2; pass++) {
-        for (long y = y0; y < y1; y++)
-            for (long x = x0; x < x1; x++) {
-                double dx = (double)x - s->cx, dy = (double)y - s->cy, r2 = dx * dx + dy * dy;
-                if (!(r2 < (double)rings * (double)rings))
-                    continue;
-                long k = (long)sqrt(r2);
-                k = k < rings ? k : rings - 1;
-                if (pass == 0)
-                    w->start[k + 2]++;
-                else
-                    w->ring[w->start[k + 1]++] = (struct ring){s->v[y * s->nx + x], (float)dx, (float)dy};
-            }
-        for (long k = 0; pass == 0 && k < rings; k++)
-            w->start[k + 2] += w->start[k + 1];
-    }
-    *nring = rings;
-    return OK;
-}
-
-/* Flux inside radius r: `inner` is the flux of all rings below `from`, whose pixels are wholly inside. */
-static double growth(const struct photometry_work *w, long nring, double r, long from, double inner)
-{
-    double sum = inner;
-    for (long k = from; k < nring && (double)k < r + 0.75; k++)
-        for (long i = w->start[k]; i < w->start[k + 1]; i++) {
-            const struct ring *p = &w->ring[i];
-            sum += (double)p->v * circle_overlap((double)p->dx, (double)p->dy, r);
-        }
-    return sum;
-}
-
-/* Radius that holds `flux`, within `reach`; reach when none does. *found: it lies well inside. */
-static int radius_within(struct photometry_work *w, double reach, double flux, int *found, double *radius)
-{
-    long nring, k = 0;
-    int st = sort_rings(w, reach, &nring);
-    if (st)
-        return st;
-    double sum = 0, ring = 0;
-    for (; k < nring; k++) {                   /* the ring of pixel centres in which the sum passes `flux` */
-        ring = 0;
-        for (long i = w->start[k]; i < w->start[k + 1]; i++)
-            ring += (double)w->ring[i].v;
-        if (sum + ring >= flux)
-            break;
-        sum += ring;
-    }
-    *found = k + 3 < nring;
-    double guess = k < nring ? sqrt((double)(k * k) + (2.0 * (double)k + 1) * (flux - sum) / ring) : reach;
-    long from = (long)(guess - 2.75) > 0 ? (long)(guess - 2.75) : 0;
-    double inner = 0;
-    for (long i = 0; i < w->start[from]; i++)
-        inner += (double)w->ring[i].v;
-    /* bracket, then false position in r^2 with the Illinois rule */
-    double lo = guess > 1 ? guess - 1 : 0, hi = guess + 1;
-    double f_lo = growth(w, nring, lo, from, inner) - flux, f_hi = growth(w, nring, hi, from, inner) - flux;
-    while (f_hi < 0 && hi < reach) {
-        lo = hi;
-        f_lo = f_hi;
-        hi += 1;
-        f_hi = growth(w, nring, hi, from, inner) - flux;
-    }
-    if (f_lo >= 0 && lo > 0) {                 /* the guess was above: start from the centre */
-        lo = 0;
-        from = 0;
-        inner = 0;
-        f_lo = -flux;
-    }
-    *radius = hi < reach ? hi : reach;
-    if (f_hi < 0)
-        return OK;
-    int last = 0;
-    for (int i = 0; i < 40 && hi - lo > 2e-4 * hi; i++) {
-        double r = sqrt(lo * lo - f_lo / (f_hi - f_lo) * (hi * hi - lo * lo));
-        double here = growth(w, nring, r, from, inner) - flux;
-        *radius = r;
-        if (fabs(here) < 1e-4 * flux)
-            break;
-        if (here >= 0) {
-            hi = r;
-            f_hi = here;
-            f_lo *= last == 1 ? 0.5 : 1;
-            last = 1;
-        } else {
-            lo = r;
-            f_lo = here;
-            f_hi *= last == -1 ? 0.5 : 1;
-            last = -1;
-        }
-    }
-    *radius = *radius < reach ? *radius : reach;
-    return OK;
-}
-
-/* The same, looking at the inner pixels first. */
-static int half_light(struct photometry_work *w, double near, double reach, double flux, double *radius)
-{
-    int found = 0, st = near < reach ? radius_within(w, near, flux, &found, radius) : OK;
-    return st || found ? st : radius_within(w, reach, flux, &found, radius);
-}
-
 /* ---- the Gaussian core ---- */
 
-/* Sums of I W, I W r^2, W^2 and first moments for W = exp(-r^2 / 2 w2), within 4 sqrt(w2). */
+/* w[i] = exp(-(i - c)^2 / 2 w2) for 0 <= i < n, by steps from the peak outwards. */
+static void gaussian_line(double c, double w2, long n, double *w)
+{
+    double near = nearbyint(c), step2 = exp(-1 / w2);
+    long top = near > 0 ? near < (double)(n - 1) ? (long)near : n - 1 : 0;
+    double d = (double)top - c;
+    w[top] = exp(-0.5 * d * d / w2);
+    double up = exp(-(d + 0.5) / w2), down = exp((d - 0.5) / w2);
+    for (long i = top + 1; i < n; i++, up *= step2)
+        w[i] = w[i - 1] * up;
+    for (long i = top; i-- > 0; down *= step2)
+        w[i] = w[i + 1] * down;
+}
+
+/* Sums over a row of v t, v t x, v t x^2 with the tables t, t x, t x^2 of n values each (n a multiple of LANES). */
+static inline void row_sums(const float *v, const double *t, long n, double out[3][LANES])
+{
+    for (long i = 0; i < n; i += LANES)
+        for (int j = 0; j < LANES; j++) {
+            double f = (double)v[i + j];
+            out[0][j] += f * t[i + j];
+            out[1][j] += f * t[n + i + j];
+            out[2][j] += f * t[2 * n + i + j];
+        }
+}
+
+/* The sums of all rows: sum v W, v W dx, v W dy, v W r^2; rows weighted with wy about dy0. */
+WIDE static void stamp_sums(const float *v, long stride, long n, long rows, const double *table, const double *wy,
+                            double dy0, double out[4])
+{
+    out[0] = out[1] = out[2] = out[3] = 0;
+    for (long y = 0; y < rows; y++) {
+        double s[3][LANES] = {{0}}, sum[3] = {0}, dy = dy0 + (double)y;
+        row_sums(v + y * stride, table, n, s);
+        for (int k = 0; k < 3; k++)
+            for (int j = 0; j < LANES; j++)
+                sum[k] += s[k][j];
+        out[0] += wy[y] * sum[0];
+        out[1] += wy[y] * sum[1];
+        out[2] += wy[y] * sum[0] * dy;
+        out[3] += wy[y] * (sum[2] + sum[0] * dy * dy);
+    }
+}
+
+/*
+ * Sums of I W, I W r^2, W^2 and first moments for W = exp(-r^2 / 2 w2), within
+ * 4 sqrt(w2).  line: room for 5 (sides + LANES).
+ */
 static void weighted_sums(const struct stamp *s, double cx, double cy, double w2, double *line, double out[5])
 {
     double reach = 4 * sqrt(w2);
     long x0 = cx - reach > 0 ? (long)ceil(cx - reach) : 0, y0 = cy - reach > 0 ? (long)ceil(cy - reach) : 0;
     long x1 = cx + reach < (double)(s->nx - 1) ? (long)floor(cx + reach) + 1 : s->nx;
     long y1 = cy + reach < (double)(s->ny - 1) ? (long)floor(cy + reach) + 1 : s->ny;
-    for (long x = x0; x < x1; x++)
-        line[x] = exp(-0.5 * ((double)x - cx) * ((double)x - cx) / w2);
     memset(out, 0, 5 * sizeof *out);
-    for (long y = y0; y < y1; y++) {
-        double dy = (double)y - cy, wy = exp(-0.5 * dy * dy / w2), row[4] = {0};
-        for (long x = x0; x < x1; x++) {
-            double dx = (double)x - cx, t = line[x] * (double)s->v[y * s->nx + x];
-            row[0] += t;
-            row[1] += t * dx;
-            row[2] += t * dx * dx;
-            row[3] += line[x] * line[x];
-        }
-        out[0] += wy * row[0];
-        out[1] += wy * (row[2] + row[0] * dy * dy);
-        out[2] += wy * wy * row[3];
-        out[3] += wy * row[1];
-        out[4] += wy * row[0] * dy;
+    if (x1 <= x0 || y1 <= y0)
+        return;
+    long n = x1 - x0, wide = (n + LANES - 1) / LANES * LANES, rows = y1 - y0;
+    double *wy = line + 3 * wide, sum[4], line2 = 0, rows2 = 0;
+    gaussian_line(cx - (double)x0, w2, n, line);
+    gaussian_line(cy - (double)y0, w2, rows, wy);
+    for (long i = 0; i < wide; i++) {      /* zeros beyond n: the stamp has room for LANES more */
+        double dx = (double)(x0 + i) - cx;
+        line[i] = i < n ? line[i] : 0;
+        line[wide + i] = line[i] * dx;
+        line[2 * wide + i] = line[i] * dx * dx;
+        line2 += line[i] * line[i];
     }
+    for (long y = 0; y < rows; y++)
+        rows2 += wy[y] * wy[y];
+    stamp_sums(s->v + y0 * s->nx + x0, s->nx, wide, rows, line, wy, (double)y0 - cy, sum);
+    out[0] = sum[0];
+    out[1] = sum[3];
+    out[2] = line2 * rows2;
+    out[3] = sum[1];
+    out[4] = sum[2];
 }
 
 struct core {
@@ -440,12 +363,13 @@ struct core {
 
 /*
  * The circular Gaussian that fits best by least squares: the width w at which
- * the weighted second moment is w^2/2, by fixed-point steps.  0 when there is
- * none between 0.3 px and the stamp.
+ * the weighted second moment is w^2/2, by secant steps in ln w^2.  0 when there
+ * is none between 0.3 px and the stamp.
  */
 static struct core fit_core(const struct stamp *s, double cx, double cy, double start, double *line)
 {
     double w2 = start > 0.3 ? start : 0.3, most = 0.25 * (double)(s->nx * s->nx + s->ny * s->ny);
+    double u_last = 0, f_last = 0;
     for (int i = 0; i < 50; i++) {
         double t[5];
         weighted_sums(s, cx, cy, w2, line, t);
@@ -456,7 +380,13 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
         next = next > 0.25 * w2 ? next < 4 * w2 ? next : 4 * w2 : 0.25 * w2;
         if (fabs(next - w2) < 1e-3 * w2)
             return (struct core){next};
-        w2 = next;
+        double u = log(w2), f = log(next) - u, step = f;
+        double slope = i > 0 ? (f - f_last) / (u - u_last) : -1;
+        if (slope < -0.2 && slope > -2)            /* else it is not a settled approach */
+            step = -f / slope;
+        u_last = u;
+        f_last = f;
+        w2 = exp(u + step);
         if (!(w2 > 0.09 && w2 < most))
             break;
     }
@@ -574,9 +504,13 @@ static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
     long nx = f->im->nx, ny = f->im->ny;
     long x0 = b->xmin > 0 ? b->xmin - 1 : 0, x1 = b->xmax + 1 < nx ? b->xmax + 1 : nx - 1;
     long y0 = b->ymin > 0 ? b->ymin - 1 : 0, y1 = b->ymax + 1 < ny ? b->ymax + 1 : ny - 1;
-    for (long y = y0; y <= y1; y++)
+    for (long y = y0; y <= y1; y++) {
+        size_t row = (size_t)y * (size_t)nx;
+        if (all_finite(f->im->pix + row + x0, x1 - x0 + 1)
+            && (!f->p->rms_map || all_finite(f->p->rms_map + row + x0, x1 - x0 + 1)))
+            continue;
         for (long x = x0; x <= x1; x++) {
-            size_t at = (size_t)y * (size_t)nx + (size_t)x;
+            size_t at = row + (size_t)x;
             if (fabsf(f->im->pix[at]) <= FLT_MAX && (!f->p->rms_map || f->p->rms_map[at] <= FLT_MAX))
                 continue;
             for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < ny; v++)
@@ -584,6 +518,7 @@ static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
                     if (f->label[(size_t)v * (size_t)nx + (size_t)u] == own)
                         return 1;
         }
+    }
     return 0;
 }
 
@@ -620,25 +555,42 @@ static int measure_auto(const struct field *f, int32_t own, struct photometry_wo
     return OK;
 }
 
-static int measure_sizes(const struct field *f, struct photometry_work *w, struct object *o)
+/* FLUX_RADIUS and its further fractions into more[]. */
+static int measure_radii(const struct field *f, struct photometry_work *w, struct object *o, double *more)
 {
     const struct stamp *s = &w->stamp;
     o->flux_radius = sqrt(o->a * o->b);
+    for (size_t k = 0; k < f->p->nfractions; k++)
+        more[k] = o->flux_radius;
+    if (!(o->flux_auto > 0))
+        return OK;
+    int st = growth_open(w->growth, s->v, s->nx, s->ny, s->cx, s->cy, o->kron_radius * o->a);
+    if (!st)
+        st = growth_radius(w->growth, f->p->flux_fraction * o->flux_auto, &o->flux_radius);
+    for (size_t k = 0; k < f->p->nfractions && !st; k++)
+        st = growth_radius(w->growth, f->p->fraction[k] * o->flux_auto, &more[k]);
+    return st;
+}
+
+static int measure_sizes(const struct field *f, struct photometry_work *w, struct object *o, double *more)
+{
+    const struct stamp *s = &w->stamp;
     o->fwhm = FWHM_SIGMA * sqrt(0.5 * (o->xx + o->yy));
     o->xwin = o->x;
     o->ywin = o->y;
-    int st = OK;
-    if (o->flux_auto > 0)
-        st = half_light(w, 2 * o->a + 3, o->kron_radius * o->a, f->p->flux_fraction * o->flux_auto, &o->flux_radius);
+    o->star_prob = 0.5;
+    int st = measure_radii(f, w, o, more);
     if (!st)
-        st = grow(&w->line, &w->cap_line, (size_t)s->nx, sizeof *w->line);
+        st = grow(&w->line, &w->cap_line, 5 * (size_t)(s->nx + s->ny + LANES), sizeof *w->line);
     if (st)
         return st;
     double *line = w->line;
-    struct core c = fit_core(s, s->cx, s->cy, 0.25 * (o->xx + o->yy), line);
-    if (c.variance > 0)
-        o->fwhm = FWHM_SIGMA * sqrt(c.variance);
-    o->star_prob = measure_star(f, s, f->p->rms_map ? o->rms : f->p->noise, line);
+    if (!f->p->plain_sizes) {
+        struct core c = fit_core(s, s->cx, s->cy, 0.25 * (o->xx + o->yy), line);
+        if (c.variance > 0)
+            o->fwhm = FWHM_SIGMA * sqrt(c.variance);
+        o->star_prob = measure_star(f, s, f->p->rms_map ? o->rms : f->p->noise, line);
+    }
     if (f->p->windowed) {
         double cx = s->cx, cy = s->cy;
         window_centroid(s, 2 * o->flux_radius / FWHM_SIGMA, line, &cx, &cy);
@@ -672,7 +624,7 @@ int photometry_measure(const struct field *f, const struct blob *blob, int32_t i
     from_blob(f, blob, &o);
     int st = measure_auto(f, index + 1, w, &o);
     if (!st)
-        st = measure_sizes(f, w, &o);
+        st = measure_sizes(f, w, &o, aperture ? aperture + 2 * f->p->napertures : NULL);
     if (!st)
         st = measure_apertures(f, index + 1, w, &o, aperture);
     if (st)

@@ -12,6 +12,7 @@
 #include "background.h"
 #include "deblend.h"
 #include "err.h"
+#include "growth.h"
 #include "image.h"
 #include <stdint.h>
 
@@ -32,10 +33,13 @@ struct photometry_params {
     const float *rms_map;      /* or NULL */
     double saturation;         /* level in the image's unit, INFINITY: none */
     double flux_fraction;      /* of FLUX_RADIUS, 0.5 */
+    size_t nfractions;         /* more fractions for FLUX_RADIUS_2, ... */
+    const double *fraction;
     size_t napertures;
     const double *aperture;    /* diameters, pixels */
     double psf_fwhm;           /* pixels, of the PSF before the pixel; 0 unknown: STAR_PROB 0.5 */
     int windowed;              /* also XWIN, YWIN */
+    int plain_sizes;           /* leave out FWHM and STAR_PROB */
 };
 
 /* One measured object. Positions in pixels counting from 0. */
@@ -63,15 +67,13 @@ void photometry_work_free(struct photometry_work *w);
 
 /*
  * Measure object `index` (label index + 1) from its sums.  aperture: room for
- * 2 * napertures, flux and error alternating (NULL when there are none).
+ * 2 * napertures, flux and error alternating, and the nfractions radii (NULL
+ * when there are none).
  * The result has no NaN: where a quantity has no value (flux <= 0), sizes
  * fall back on the isophote and DETECT_APERTURE is set.
  */
 MUST_CHECK int photometry_measure(const struct field *f, const struct blob *blob, int32_t index,
                                   struct photometry_work *w, struct object *out, double *aperture);
-
-/* Area of overlap of a unit pixel centred at (dx, dy) with a circle of radius r about 0. */
-double circle_overlap(double dx, double dy, double r);
 
 /*
  * Probability that an object is a point source.  log_ratio: ln of its second

@@ -25,10 +25,9 @@ struct feeder {
     const struct smooth *filter;
     int negative;
     long next;             /* the row that enters the ring next */
-    float *plain;          /* ring of 2r+1 rows above background */
+    float *plain;          /* ring of 2r+1 rows above background, each with r zeros at both ends */
     float *across;         /* ring of 2r+1 rows filtered along x */
     const float **window;  /* 2r+1 pointers for the column filter */
-    float *padded;         /* nx + 2r, zeros at both ends */
     float *zero;           /* nx zeros */
 };
 
@@ -37,19 +36,17 @@ static void feeder_free(struct feeder *f)
     free(f->plain);
     free(f->across);
     free(f->window);
-    free(f->padded);
     free(f->zero);
 }
 
 static int feeder_open(struct feeder *f, long y0)
 {
     size_t nx = (size_t)f->im->nx, r = (size_t)f->filter->radius, n = 2 * r + 1;
-    f->plain = malloc(n * nx * sizeof(float));
+    f->plain = calloc(n * (nx + 2 * r), sizeof(float));
     f->across = malloc(n * nx * sizeof(float));
     f->window = malloc(n * sizeof *f->window);
-    f->padded = calloc(nx + 2 * r, sizeof(float));
     f->zero = calloc(nx, sizeof(float));
-    if (!f->plain || !f->across || !f->window || !f->padded || !f->zero) {
+    if (!f->plain || !f->across || !f->window || !f->zero) {
         feeder_free(f);
         return E_NOMEM;
     }
@@ -69,10 +66,21 @@ WIDE static void negate(long n, float *v)
         v[i] = -v[i];
 }
 
-static float *ring(const struct feeder *f, float *base, long y)
+static size_t ring_place(const struct feeder *f, long y)
 {
     long n = 2 * f->filter->radius + 1;
-    return base + (size_t)(((y % n) + n) % n) * (size_t)f->im->nx;
+    return (size_t)(((y % n) + n) % n);
+}
+
+static float *plain_row(const struct feeder *f, long y)
+{
+    size_t r = (size_t)f->filter->radius;
+    return f->plain + ring_place(f, y) * ((size_t)f->im->nx + 2 * r) + r;
+}
+
+static float *across_row(const struct feeder *f, long y)
+{
+    return f->across + ring_place(f, y) * (size_t)f->im->nx;
 }
 
 /* Row y above background (0 where bad) into the rings. */
@@ -81,7 +89,7 @@ static void feeder_take(struct feeder *f, long y)
     long nx = f->im->nx, r = f->filter->radius;
     if (y < 0 || y >= f->im->ny)
         return;
-    float *plain = ring(f, f->plain, y);
+    float *plain = plain_row(f, y);
     size_t at = (size_t)y * (size_t)nx;
     background_subtract(f->b, f->im->pix + at, y, 0, nx, 0, plain);
     if (f->rms_map)
@@ -90,8 +98,7 @@ static void feeder_take(struct feeder *f, long y)
         negate(nx, plain);
     if (r == 0)
         return;
-    memcpy(f->padded + r, plain, (size_t)nx * sizeof(float));
-    smooth_row(f->filter, f->padded + r, nx, ring(f, f->across, y));
+    smooth_row(f->filter, plain, nx, across_row(f, y));
 }
 
 /* Filtered row y into out; *plain the same row unfiltered. Rows come in order. */
@@ -100,13 +107,13 @@ static void feeder_row(struct feeder *f, long y, float *out, const float **plain
     long nx = f->im->nx, r = f->filter->radius;
     while (f->next <= y + r)
         feeder_take(f, f->next++);
-    *plain = ring(f, f->plain, y);
+    *plain = plain_row(f, y);
     if (r == 0) {
         memcpy(out, *plain, (size_t)nx * sizeof(float));
         return;
     }
     for (long j = -r; j <= r; j++)
-        f->window[j + r] = y + j < 0 || y + j >= f->im->ny ? f->zero : ring(f, f->across, y + j);
+        f->window[j + r] = y + j < 0 || y + j >= f->im->ny ? f->zero : across_row(f, y + j);
     smooth_column(f->filter, f->window, nx, out);
 }
 
@@ -138,6 +145,8 @@ struct search {
     const struct smooth *filter;
     const struct segment_params *p;
     struct strip *strip;
+    struct feeder *feeder;     /* one per worker */
+    float **smooth;            /* a row for each worker */
 };
 
 static void strip_free(struct strip *s)
@@ -205,34 +214,57 @@ static int scan_row(struct strip *s, long y, long nx, float threshold, const flo
     return start >= 0 ? add_run(s, y, start, nx, smooth, plain) : OK;
 }
 
+/* One strip with a feeder that is open. */
+static int search_strip(const struct search *s, long i, struct feeder *f, float *smooth)
+{
+    const struct segment_params *p = s->p;
+    long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
+    int st = OK;
+    f->next = y0 - f->filter->radius;
+    for (long y = y0; y < y1 && !st; y++) {
+        const float *plain, *raw = s->im->pix + (size_t)y * (size_t)nx;
+        feeder_row(f, y, smooth, &plain);
+        if (p->rms_map)
+            cut_by_map(p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, smooth);
+        st = scan_row(&s->strip[i], y, nx, p->rms_map ? 0 : (float)(p->threshold * p->noise), raw, smooth, plain);
+    }
+    return st;
+}
+
 static int search_strips(void *ctx, long begin, long end, int worker)
 {
-    (void)worker;
     const struct search *s = ctx;
-    const struct segment_params *p = s->p;
-    long nx = s->im->nx;
-    float *smooth = malloc((size_t)nx * sizeof *smooth);
-    if (!smooth)
+    struct feeder *f = &s->feeder[worker];
+    if (!f->im) {
+        *f = (struct feeder){.im = s->im, .b = s->b, .rms_map = s->p->rms_map, .filter = s->filter,
+                             .negative = s->p->negative};
+        int st = feeder_open(f, 0);
+        if (st) {
+            *f = (struct feeder){0};
+            return st;
+        }
+    }
+    if (!s->smooth[worker] && !(s->smooth[worker] = malloc((size_t)s->im->nx * sizeof(float))))
         return E_NOMEM;
     int st = OK;
-    for (long i = begin; i < end && !st; i++) {
-        struct feeder f = {.im = s->im, .b = s->b, .rms_map = p->rms_map, .filter = s->filter,
-                           .negative = p->negative};
-        long y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
-        st = feeder_open(&f, y0);
-        if (st)
-            break;
-        for (long y = y0; y < y1 && !st; y++) {
-            const float *plain, *raw = s->im->pix + (size_t)y * (size_t)nx;
-            feeder_row(&f, y, smooth, &plain);
-            if (p->rms_map)
-                cut_by_map(p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, smooth);
-            st = scan_row(&s->strip[i], y, nx, p->rms_map ? 0 : (float)(p->threshold * p->noise),
-                          raw, smooth, plain);
-        }
-        feeder_free(&f);
-    }
-    free(smooth);
+    for (long i = begin; i < end && !st; i++)
+        st = search_strip(s, i, f, s->smooth[worker]);
+    return st;
+}
+
+/* Search with scratch for every worker. */
+static int search_all(struct search *s, long n)
+{
+    size_t workers = (size_t)s->p->threads;
+    s->feeder = calloc(workers, sizeof *s->feeder);
+    s->smooth = calloc(workers, sizeof *s->smooth);
+    int st = s->feeder && s->smooth ? par_for(n, 1, s->p->threads, search_strips, s) : E_NOMEM;
+    for (size_t i = 0; i < workers && s->feeder; i++)
+        feeder_free(&s->feeder[i]);
+    for (size_t i = 0; i < workers && s->smooth; i++)
+        free(s->smooth[i]);
+    free(s->feeder);
+    free(s->smooth);
     return st;
 }
 
@@ -374,10 +406,10 @@ int segment_find(struct segments *s, const struct image *im, const struct backgr
         return E_RANGE;
     long n = (im->ny + STRIP - 1) / STRIP;
     struct segments out = {0};
-    struct search search = {im, b, filter, p, calloc((size_t)n, sizeof(struct strip))};
+    struct search search = {im, b, filter, p, calloc((size_t)n, sizeof(struct strip)), NULL, NULL};
     if (!search.strip)
         return E_NOMEM;
-    int st = par_for(n, 1, p->threads, search_strips, &search);
+    int st = search_all(&search, n);
     if (!st)
         st = join_strips(&out, search.strip, n);
     if (!st)

@@ -10,8 +10,8 @@
 static void flat(struct background *b, long nx, long ny, double node[8])
 {
     memset(node, 0, 8 * sizeof *node);
-    b->level = (struct mesh){nx, ny, 1, 1, 0, node, NULL};
-    b->rms = (struct mesh){nx, ny, 1, 1, 1, node + 4, NULL};
+    b->level = (struct mesh){nx, ny, 1, 1, 0, node, NULL, NULL};
+    b->rms = (struct mesh){nx, ny, 1, 1, 1, node + 4, NULL, NULL};
 }
 
 /* Labels by repeated relaxation of indices: slow and obvious. */
