@@ -10,7 +10,7 @@
 #include <string.h>
 
 struct params {
-    const char *stars;
+    const char *stars, *columns;
     int which, mark;
     struct opt_strs where;
 };
@@ -107,6 +107,27 @@ static void keep_rows(struct table *t, const int64_t *bits, int mark)
     free(keep);
 }
 
+/* Keep the columns of a list "NAME,NAME..." and, when marked, CUT. */
+static void keep_columns(struct table *t, const char *list, int mark)
+{
+    unsigned char *keep = calloc(t->ncol + 1, 1);
+    if (!keep)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    for (const char *p = list; *p;) {
+        size_t len = strcspn(p, ","), k = 0;
+        while (k < t->ncol && !(strlen(t->col[k].name) == len && memcmp(t->col[k].name, p, len) == 0))
+            k++;
+        if (k == t->ncol)
+            die(EXIT_RUN, "--columns: the catalogue has no column %.*s", (int)len, p);
+        keep[k] = 1;
+        p += len + (p[len] == ',');
+    }
+    for (size_t k = 0; k < t->ncol; k++)
+        keep[k] |= (unsigned char)(mark && strcmp(t->col[k].name, "CUT") == 0);
+    table_keep_columns(t, keep);
+    free(keep);
+}
+
 int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
@@ -127,6 +148,7 @@ int main(int argc, char **argv)
         {"snr", 0, OPT_REAL, &cuts.snr, 0, 1e9, "MIN", "keep FLUX_AUTO/FLUXERR_AUTO >= MIN (0: no cut)", NULL, 0},
         {"flags", 0, OPT_LONG, &cuts.flags, 0, 511, "MASK", "FLAGS_RRG with one of these bits fails the size cut", NULL, 0},
         {"where", 0, OPT_STRS, &p.where, 0, 0, "EXPR", "keep NAME<VALUE (< <= > >= = !=); may be given several times", NULL, 0},
+        {"columns", 0, OPT_STR, &p.columns, 0, 0, "LIST", "write these columns only: NAME,NAME...", NULL, 0},
         {"mark", 0, OPT_FLAG, &p.mark, 0, 0, NULL, "keep all rows and add the column CUT", NULL, 0},
         {0}};
     opt_parse(&prog, own, &c, argc, argv);
@@ -149,6 +171,8 @@ int main(int argc, char **argv)
     if (!c.check) {
         set_keywords(&t, &cuts, &n);
         keep_rows(&t, bits, p.mark);
+        if (p.columns)
+            keep_columns(&t, p.columns, p.mark);
         char *record = opt_record(&prog, own, &c);
         const char *inputs[] = {c.argv[0], p.stars};
         if (table_write(&t, c.out, record, inputs, p.stars ? 2 : 1, &e))

@@ -15,8 +15,36 @@ static void check(int st, const char *what)
         die(EXIT_RUN, "%s: %s", what, err_text(st));
 }
 
+/* --bins NAME:EDGE,EDGE,...: bin k is edge[k] <= value < edge[k + 1]. */
+struct bins {
+    char key[64];
+    size_t n;                 /* 0: no bins */
+    double edge[64];
+};
+
+static void parse_bins(struct bins *b, const char *text)
+{
+    size_t len = strcspn(text, ":");
+    if (!text[len] || len == 0 || len >= sizeof b->key)
+        die(EXIT_USAGE, "--bins '%s': write NAME:EDGE,EDGE,...", text);
+    memcpy(b->key, text, len);
+    size_t n = 0;
+    for (const char *p = text + len; *p;) {
+        size_t width = strcspn(++p, ",");
+        if (n == sizeof b->edge / sizeof *b->edge)
+            die(EXIT_USAGE, "--bins '%s': more than 64 edges", text);
+        if (table_scan_real(p, width, &b->edge[n]) != OK || (n > 0 && !(b->edge[n] > b->edge[n - 1])) || !isfinite(b->edge[n]))
+            die(EXIT_USAGE, "--bins '%s': edges must be rising numbers", text);
+        n++;
+        p += width;
+    }
+    if (n < 2)
+        die(EXIT_USAGE, "--bins '%s': at least two edges", text);
+    b->n = n - 1;
+}
+
 /* Read one catalogue at a time and keep what is needed. */
-static struct fom_image *read_all(const struct common *c)
+static struct fom_image *read_all(const struct common *c, const char *key, int psf)
 {
     struct err e;
     struct fom_image *im = calloc((size_t)c->argc + 1, sizeof *im);
@@ -26,8 +54,10 @@ static struct fom_image *read_all(const struct common *c)
         struct table t = {0};
         if (table_read(&t, c->argv[i], c->max_memory, &e))
             die(EXIT_RUN, "%s", e.text);
-        if (fom_image_read(&im[i], &t, &e))
+        if (fom_image_read(&im[i], &t, key, &e))
             die(EXIT_RUN, "%s: %s", c->argv[i], e.text);
+        if (psf && !(isfinite(im[i].epsf[0]) && isfinite(im[i].epsf[1])))
+            die(EXIT_RUN, "%s: no keywords EPSF1 EPSF2: correct the shapes for a PSF with rrgshape", c->argv[i]);
         table_free(&t);
     }
     return im;
@@ -42,11 +72,25 @@ static int by_set_and_scale(const void *a, const void *b)
 {
     const struct fom_result *p = a, *q = b;
     int c = strcmp(p->set, q->set);
-    return c ? c : p->scale < q->scale ? -1 : p->scale > q->scale;
+    c = c ? c : p->scale < q->scale ? -1 : p->scale > q->scale;
+    return c ? c : p->lo < q->lo ? -1 : p->lo > q->lo;
 }
 
-/* One result per (SETNAME, CCDSCALE), sorted; returns how many. */
-static size_t group_all(size_t n, struct fom_image *im, const struct fom_options *o, struct fom_result *r)
+/* One result per bin of one group. */
+static void group_bins(size_t m, const struct fom_image **member, struct fom_image *im, size_t n, const struct bins *b,
+                       const struct fom_options *o, struct fom_result *r)
+{
+    for (size_t k = 0; k < (b->n ? b->n : 1); k++) {
+        for (size_t i = 0; i < n && b->n; i++)
+            fom_image_bin(&im[i], b->edge[k], b->edge[k + 1]);
+        check(fom_group(m, member, o, &r[k]), member[0]->set);
+        r[k].lo = b->n ? b->edge[k] : NAN;
+        r[k].hi = b->n ? b->edge[k + 1] : NAN;
+    }
+}
+
+/* One result per (SETNAME, CCDSCALE) and bin, sorted; returns how many. */
+static size_t group_all(size_t n, struct fom_image *im, const struct bins *b, const struct fom_options *o, struct fom_result *r)
 {
     const struct fom_image **member = calloc(n + 1, sizeof *member);
     size_t groups = 0;
@@ -61,7 +105,8 @@ static size_t group_all(size_t n, struct fom_image *im, const struct fom_options
         for (j = i; j < n; j++)
             if (same_group(&im[j], &im[i]))
                 member[m++] = &im[j];
-        check(fom_group(m, member, o, &r[groups++]), im[i].set);
+        group_bins(m, member, im, n, b, o, &r[groups]);
+        groups += b->n ? b->n : 1;
     }
     free(member);
     qsort(r, groups, sizeof *r, by_set_and_scale);
@@ -80,7 +125,9 @@ static void tell_undefined(const struct common *c, const struct fom_image *im, s
         for (size_t k = 0; k < sizeof asked / sizeof *asked; k++)
             if (!isfinite(r[i].v[asked[k]]))
                 snprintf(list + strlen(list), sizeof list - strlen(list), " %s", fom_column[asked[k]].name);
-        if (*list)
+        if (*list && !isnan(r[i].lo))
+            warn("%s %g, bin %g to %g: undefined (too few objects, shears or keywords):%s", r[i].set, r[i].scale, r[i].lo, r[i].hi, list);
+        else if (*list)
             warn("%s %g: undefined (too few objects, shears or keywords):%s", r[i].set, r[i].scale, list);
     }
 }
@@ -106,19 +153,23 @@ static void write_text(const struct common *c, size_t n, const struct fom_result
         {"slope 1 (pairs)", FOM_BP1, FOM_BP1SE, 4}, {"slope 2 (pairs)", FOM_BP2, FOM_BP2SE, 4},
         {"selection 1", FOM_SEL1, FOM_SEL1SE, 3}, {"total m 1", FOM_TOT1, FOM_TOT1SE, 3},
         {"sigma_gamma", FOM_SIGMA, FOM_SIGMAERR, 4}, {"error arcmin", FOM_STDERR, FOM_STDERRERR, 4},
-        {"kurtosis 1", FOM_KURT1, FOM_KURT1ERR, 2}, {"log10 dC_l", FOM_LOGDC, FOM_LOGDCERR, 3}};
+        {"kurtosis 1", FOM_KURT1, FOM_KURT1ERR, 2}, {"log10 dC_l", FOM_LOGDC, FOM_LOGDCERR, 3}, {"best scale", FOM_OPT, FOM_OPTERR, 4}};
     enum { COLS = sizeof col / sizeof *col };
     struct err e;
     struct outfile *f;
     char line[1024], cell[32];
     if (outfile_open(&f, c->out, c->argv, (size_t)c->argc, &e))
         die(EXIT_RUN, "%s", e.text);
-    int len = snprintf(line, sizeof line, "%-10s %6s", "set", "scale");
+    int binned = n > 0 && !isnan(r[0].lo), len = snprintf(line, sizeof line, "%-10s %6s", "set", "scale");
+    if (binned)
+        len += snprintf(line + len, sizeof line - (size_t)len, "  %17s", "bin");
     for (int k = 0; k < COLS; k++)
         len += snprintf(line + len, sizeof line - (size_t)len, "  %17s", col[k].head);
     check(outfile_write(f, line, (size_t)len), c->out);
     for (size_t i = 0; i < n; i++) {
         len = snprintf(line, sizeof line, "\n%-10.32s %6.3f", r[i].set, r[i].scale);
+        if (binned)
+            len += snprintf(line + len, sizeof line - (size_t)len, "  %8g %8g", r[i].lo, r[i].hi);
         for (int k = 0; k < COLS; k++)
             len += snprintf(line + len, sizeof line - (size_t)len, "  %17s",
                             number(cell, r[i].v[col[k].value], col[k].err < 0 ? NAN : r[i].v[col[k].err], col[k].digits));
@@ -133,7 +184,9 @@ int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
     struct fom_options o = {.radius = 0.15, .draws = 200, .ref_scale = 0.10};
-    int text = 0;
+    struct bins bins = {0};
+    const char *bin_text = NULL;
+    int text = 0, against = 0;
     const struct program prog = {
         "fom", "figures of merit: number density, bias of the shear, its spread, error of the power spectrum",
         "CATALOGUE...", 1, -1,
@@ -145,6 +198,8 @@ int main(int argc, char **argv)
         {"match-radius", 'r', OPT_REAL, &o.radius, 1e-6, 1e4, "ARCSEC", "largest distance of common objects", NULL, 0},
         {"median", 0, OPT_FLAG, &o.median, 0, 0, NULL, "median instead of mean response", NULL, 0},
         {"fit-line", 0, OPT_FLAG, &o.fit_line, 0, 0, NULL, "correct sigma with the slopes of the fits, not of the pairs", NULL, 0},
+        {"bins", 'b', OPT_STR, &bin_text, 0, 0, "NAME:LIST", "a row for each bin of a column, SNR or DISTANCE between the edges of the list", NULL, 0},
+        {"against", 0, OPT_CHOICE, &against, 0, 0, "WHAT", "slopes against the shear, or the ellipticity of the PSF (leakage)", "shear|psf", 0},
         {"draws", 0, OPT_LONG, &o.draws, 0, 100000, "N", "bootstrap resamplings", NULL, 0},
         {"table", 't', OPT_FLAG, &text, 0, 0, NULL, "write a short aligned table for people, not a catalogue", NULL, 0},
         {0}};
@@ -152,12 +207,16 @@ int main(int argc, char **argv)
     o.seed = c.seed;
 
     size_t n = (size_t)c.argc;
-    struct fom_image *im = read_all(&c);
-    struct fom_result *r = calloc(n + 1, sizeof *r);
+    if (bin_text)
+        parse_bins(&bins, bin_text);
+    o.psf = against == 1;
+    struct fom_image *im = read_all(&c, bin_text ? bins.key : NULL, o.psf);
+    struct fom_result *r = calloc(n * (bins.n + 1) + 1, sizeof *r);
     if (!r)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
-    size_t groups = group_all(n, im, &o, r);
+    size_t groups = group_all(n, im, &bins, &o, r);
     check(fom_compare(groups, r, &o), "lines over scales");
+    check(fom_optimum(groups, r, &o), "best scale");
     if (c.check) {
         printf("%zu catalogues in %zu groups\n", n, groups);
     } else if (text) {
@@ -174,6 +233,8 @@ int main(int argc, char **argv)
     }
     if (!c.quiet)
         tell_undefined(&c, im, groups, r);
+    for (size_t i = 0; i < groups; i++)
+        fom_result_free(&r[i]);
     for (size_t i = 0; i < n; i++)
         fom_image_free(&im[i]);
     free(im);

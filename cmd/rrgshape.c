@@ -285,8 +285,13 @@ static void copy_keywords(struct table *t, const struct header *h)
     }
 }
 
-static void set_dstar(struct table *t, const struct starmom *s, double own, double scale)
+/* Size of a star, and the ellipticity of the PSF under a weight of 0.25 arcsec, that of a galaxy. */
+static void set_psf(struct table *t, const struct starmom *s, double own, double scale)
 {
+    struct rrg_psf p;
+    starmom_at(s, 0.25 / (isfinite(scale) ? scale : 0.1), &p);
+    check(table_set_number(t, "EPSF1", (p.m2[0] - p.m2[2]) / (p.m2[0] + p.m2[2])), "EPSF1");
+    check(table_set_number(t, "EPSF2", 2 * p.m2[1] / (p.m2[0] + p.m2[2])), "EPSF2");
     if (isfinite(s->dstar))
         check(table_set_number(t, "DSTAR", s->dstar), "DSTAR");
     if (isfinite(s->dstar_err))
@@ -342,7 +347,7 @@ static void measure_objects(struct input *in, const struct params *p, const stru
     check(st, c->argv[1]);
     copy_keywords(&in->cat, &in->hdr);
     if (psf)
-        set_dstar(&in->cat, psf, own, in->scale);
+        set_psf(&in->cat, psf, own, in->scale);
     if (c->verbose)
         warn("%s: %zu objects, %ld with flags", c->argv[1], in->cat.nrow, bad);
     free(objects);
@@ -362,7 +367,7 @@ static void measure_curve(struct input *in, const struct params *p, const struct
     measure_stars(&s, in, c->argv[1], p, c->threads, &own);
     check(starmom_to_table(&s, out), c->argv[1]);
     copy_keywords(out, &in->hdr);
-    set_dstar(out, &s, own, in->scale);
+    set_psf(out, &s, own, in->scale);
     if (c->verbose)
         warn("%s: %ld stars, d* = %.4f px at w = %.3f px", c->argv[1], s.stars[0], s.dstar, s.dstar_w);
 }

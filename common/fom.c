@@ -54,6 +54,7 @@ const struct fom_text fom_column[FOM_QUANTITIES] = {
     {"LINE2", "", "slope 2 on the line"}, {"LINE2A", "", "line: slope at scale 0"}, {"LINE2ASE", "", "its standard error"},
     {"LINE2B", "arcsec-1", "line: change with scale"}, {"LINE2BSE", "arcsec-1", "its standard error"},
     {"LOGDC", "", "log10 of the power spectrum error"}, {"LOGDCERR", "", "its standard error"},
+    {"OPTSCALE", "arcsec", "scale of the least power spectrum error of the set"}, {"OPTSCALEERR", "arcsec", "its bootstrap error"},
 };
 
 struct group {
@@ -198,7 +199,7 @@ static int fit(struct group *s, int c)
                 sum_add(&sum, s->im[k]->object[i].e[c]);
         if (n < 2)
             continue;
-        x[points] = s->im[k]->g[c];
+        x[points] = s->o->psf ? s->im[k]->epsf[c] : s->im[k]->g[c];
         y[points] = sum_value(&sum) / (double)n / s->g;
         err[points++] = s->v[sigma[c]] / sqrt((double)n);
     }
@@ -242,7 +243,7 @@ static void effective(struct group *s, const double var_e[2])
 static int pairs(struct group *s, int c)
 {
     struct fom_pairs p;
-    int st = fom_pairs(s->n, s->im, c, s->o->radius, s->o->draws, s->o->seed, &p);
+    int st = fom_pairs(s->n, s->im, c, s->o->psf, s->o->radius, s->o->draws, s->o->seed, &p);
     double *v = s->v + (c ? FOM_PAIRS2 : FOM_PAIRS1), *m = s->v + (c ? FOM_SEL2 : FOM_SEL1);
     if (st)
         return st;
@@ -259,9 +260,76 @@ static int pairs(struct group *s, int c)
     v[8] = p.mean_se / p.response;
     m[0] = p.selection / s->g;
     m[1] = p.selection_se / s->g;
-    m[2] = p.total / s->g - 1;
+    m[2] = p.total / s->g - (s->o->psf ? 0 : 1);
     m[3] = p.total_se / s->g;
     return OK;
+}
+
+void fom_result_free(struct fom_result *r)
+{
+    free(r->block);
+    *r = (struct fom_result){0};
+}
+
+/* 4 x 4 parts of the field, by the place of an object between the outermost ones. */
+static int part_of(double x, double y, const double box[4])
+{
+    double u = 4 * (x - box[0]) / (box[1] - box[0]), v = 4 * (y - box[2]) / (box[3] - box[2]);
+    int i = u > 0 ? u < 4 ? (int)u : 3 : 0, j = v > 0 ? v < 4 ? (int)v : 3 : 0;
+    return 4 * j + i;
+}
+
+/* Add one image to the 16 blocks of its field; xy has room for 2 n. */
+static int add_blocks(struct fom_block *b, const struct fom_image *im, double *xy)
+{
+    double *x = xy, *y = xy + im->n, box[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY}, mean[2] = {0}, n = 0;
+    int st = fom_flat(im, x, y);
+    for (size_t i = 0; i < im->n && st == OK; i++) {
+        box[0] = fmin(box[0], x[i]);
+        box[1] = fmax(box[1], x[i]);
+        box[2] = fmin(box[2], y[i]);
+        box[3] = fmax(box[3], y[i]);
+        if (!im->object[i].used)
+            continue;
+        mean[0] += im->object[i].e[0];
+        mean[1] += im->object[i].e[1];
+        n++;
+    }
+    for (size_t i = 0; i < im->n && st == OK; i++) {
+        const struct fom_object *o = &im->object[i];
+        if (!o->used)
+            continue;
+        struct fom_block *to = &b[part_of(x[i], y[i], box)];
+        double d1 = o->e[0] - mean[0] / n, d2 = o->e[1] - mean[1] / n;
+        to->n++;
+        to->p += 0.5 * (o->p[0] + o->p[1]);
+        to->s2 += d1 * d1 + d2 * d2;
+    }
+    return st;
+}
+
+static int blocks(const struct group *s, struct fom_result *out)
+{
+    size_t most = 0, made = 0;
+    for (size_t k = 0; k < s->n; k++)
+        most = s->im[k]->n > most ? s->im[k]->n : most;
+    double *xy = malloc((2 * most + 1) * sizeof *xy);
+    out->block = calloc(16 * s->fields, sizeof *out->block);
+    int st = xy && out->block ? OK : E_NOMEM;
+    for (size_t k = 0; k < s->n && st == OK; k++) {
+        size_t f = 0;
+        while (f < made && strcmp(out->block[16 * f].field, s->im[k]->field) != 0)
+            f++;
+        for (int j = 0; f == made && j < 16; j++) {
+            memcpy(out->block[16 * f + (size_t)j].field, s->im[k]->field, sizeof out->block->field);
+            out->block[16 * f + (size_t)j].part = j;
+        }
+        made += f == made;
+        st = add_blocks(out->block + 16 * f, s->im[k], xy);
+    }
+    out->blocks = 16 * made;
+    free(xy);
+    return st;
 }
 
 static size_t count_fields(size_t n, const struct fom_image *const *im)
@@ -280,7 +348,7 @@ int fom_group(size_t n, const struct fom_image *const *im, const struct fom_opti
 {
     if (n < 1 || o->draws < 0 || !(o->radius > 0))
         return E_RANGE;
-    struct fom_result out = {.images = (long)n, .scale = im[0]->scale, .area = im[0]->area};
+    struct fom_result out = {.lo = NAN, .hi = NAN, .images = (long)n, .scale = im[0]->scale, .area = im[0]->area};
     struct group s = {.n = n, .im = im, .o = o, .v = out.v, .fields = count_fields(n, im)};
     memcpy(out.set, im[0]->set, sizeof out.set);
     out.fields = (long)s.fields;
@@ -298,8 +366,12 @@ int fom_group(size_t n, const struct fom_image *const *im, const struct fom_opti
         st = fit(&s, c);
     for (int c = 0; c < 2 && st == OK; c++)
         st = pairs(&s, c);
-    if (st)
+    if (st == OK)
+        st = blocks(&s, &out);
+    if (st) {
+        free(out.block);
         return st;
+    }
     out.v[FOM_SIGMA_E] = sqrt(var_e[0] + var_e[1]);
     effective(&s, var_e);
     *r = out;
@@ -307,6 +379,12 @@ int fom_group(size_t n, const struct fom_image *const *im, const struct fom_opti
 }
 
 /* ---- groups together ---- */
+
+/* Of one set and one bin. */
+static int same_set(const struct fom_result *a, const struct fom_result *b)
+{
+    return strcmp(a->set, b->set) == 0 && (a->lo == b->lo || (isnan(a->lo) && isnan(b->lo)));
+}
 
 /* The slope the correction uses: by pairs where it is known, else by the fit. */
 static void slope_of(const struct fom_result *r, int c, int fit_line, double *b, double *se)
@@ -318,7 +396,7 @@ static void slope_of(const struct fom_result *r, int c, int fit_line, double *b,
 }
 
 /* Line (or, below three scales, weighted mean) of component c through the slopes of one set. */
-static int line_of_set(size_t n, struct fom_result *r, const char *set, int c, int fit_line)
+static int line_of_set(size_t n, struct fom_result *r, const struct fom_result *set, int c, int fit_line)
 {
     static const int at[2] = {FOM_L1, FOM_L2};
     double *x = malloc(3 * (n + 1) * sizeof *x);
@@ -327,7 +405,7 @@ static int line_of_set(size_t n, struct fom_result *r, const char *set, int c, i
     double *y = x + n, *s = y + n;
     size_t m = 0, scales = 0;
     for (size_t i = 0; i < n; i++) {
-        if (strcmp(r[i].set, set) != 0)
+        if (!same_set(&r[i], set))
             continue;
         slope_of(&r[i], c, fit_line, &y[m], &s[m]);
         x[m] = r[i].scale;
@@ -346,7 +424,7 @@ static int line_of_set(size_t n, struct fom_result *r, const char *set, int c, i
         weight += 1 / (s[i] * s[i]);
     }
     for (size_t i = 0; i < n && st == OK; i++) {
-        if (strcmp(r[i].set, set) != 0)
+        if (!same_set(&r[i], set))
             continue;
         double *v = r[i].v + at[c];
         v[0] = isfinite(f.b) ? f.a + f.b * r[i].scale : sum / weight;
@@ -372,31 +450,46 @@ static void corrected_spread(struct fom_result *r)
     v[FOM_STDERRERR] = v[FOM_STDERR] * hypot(v[FOM_SIGMAERR] / v[FOM_SIGMA], 0.5 * v[FOM_N_GALERR] / v[FOM_N_GAL]);
 }
 
+/* The value that of `of` is divided by: of the reference set and scale, in the same bin. */
+static double reference(size_t n, const struct fom_result *r, const struct fom_result *of, const struct fom_options *o)
+{
+    for (size_t i = 0; i < n; i++)
+        if ((!o->ref_set || strcmp(o->ref_set, r[i].set) == 0) && fabs(r[i].scale - o->ref_scale) < 1e-6 &&
+            (r[i].lo == of->lo || (isnan(r[i].lo) && isnan(of->lo))))
+            return r[i].v[FOM_LOGDC];
+    return NAN;
+}
+
 int fom_compare(size_t n, struct fom_result *r, const struct fom_options *o)
 {
     int st = OK;
     for (size_t i = 0; i < n && st == OK; i++) {
         size_t j = 0;
-        while (j < i && strcmp(r[j].set, r[i].set) != 0)
+        while (j < i && !same_set(&r[j], &r[i]))
             j++;
-        for (int c = 0; c < 2 && j == i && st == OK; c++)
-            st = line_of_set(n, r, r[i].set, c, o->fit_line);
+        for (int c = 0; c < 2 && j == i && st == OK && !o->psf; c++)
+            st = line_of_set(n, r, &r[i], c, o->fit_line);
+        if (o->psf)                       /* a leakage is no calibration */
+            r[i].v[FOM_L1] = r[i].v[FOM_L2] = 1;
     }
     if (st)
         return st;
-    double ref = NAN;
     for (size_t i = 0; i < n; i++) {
         double *v = r[i].v;
         corrected_spread(&r[i]);
         v[FOM_LOGDC] = v[FOM_SIGMA] * v[FOM_SIGMA] / (v[FOM_N_GAL] * r[i].scale);
-        if ((!o->ref_set || strcmp(o->ref_set, r[i].set) == 0) && fabs(r[i].scale - o->ref_scale) < 1e-6 && isnan(ref))
-            ref = v[FOM_LOGDC];
     }
+    double *ref = calloc(n + 1, sizeof *ref);
+    if (!ref)
+        return E_NOMEM;
+    for (size_t i = 0; i < n; i++)
+        ref[i] = reference(n, r, &r[i], o);
     for (size_t i = 0; i < n; i++) {
         double *v = r[i].v, ds = v[FOM_SIGMAERR] / v[FOM_SIGMA], dn = v[FOM_N_GALERR] / v[FOM_N_GAL];
-        v[FOM_LOGDC] = log10(v[FOM_LOGDC] / ref);
+        v[FOM_LOGDC] = log10(v[FOM_LOGDC] / ref[i]);
         v[FOM_LOGDCERR] = M_LOG10E * sqrt(4 * ds * ds + dn * dn);
     }
+    free(ref);
     return OK;
 }
 
@@ -409,6 +502,11 @@ int fom_to_table(size_t n, const struct fom_result *r, struct table *t)
         st = table_add(t, "NIMAGES", COL_INT, "", "catalogues of this group");
     if (st == OK)
         st = table_add(t, "NFIELDS", COL_INT, "", "different fields among them");
+    int binned = n > 0 && !isnan(r[0].lo);
+    if (st == OK && binned)
+        st = table_add(t, "BINLO", COL_REAL, "", "lower limit of the bin");
+    if (st == OK && binned)
+        st = table_add(t, "BINHI", COL_REAL, "", "upper limit of the bin");
     for (int k = 0; k < FOM_QUANTITIES && st == OK; k++)
         st = table_add(t, fom_column[k].name, COL_REAL32, fom_column[k].unit, fom_column[k].what);
     if (st == OK)
@@ -423,6 +521,10 @@ int fom_to_table(size_t n, const struct fom_result *r, struct table *t)
         table_reals(t, "CCDSCALE")[i] = r[i].scale;
         table_ints(t, "NIMAGES")[i] = r[i].images;
         table_ints(t, "NFIELDS")[i] = r[i].fields;
+        if (binned) {
+            table_reals(t, "BINLO")[i] = r[i].lo;
+            table_reals(t, "BINHI")[i] = r[i].hi;
+        }
         for (int k = 0; k < FOM_QUANTITIES; k++)
             table_reals(t, fom_column[k].name)[i] = r[i].v[k];
     }

@@ -19,6 +19,7 @@
 
 struct fom_options {
     double radius;            /* largest distance of common objects, arcsec */
+    int psf;                  /* slopes are against the PSF's ellipticity (leakage), not the shear */
     int median;               /* median instead of mean in G */
     int fit_line;             /* correct sigma with the slopes of the fits even where pairs give better ones */
     long draws;               /* bootstrap resamplings */
@@ -38,7 +39,7 @@ enum fom_quantity {
     FOM_PAIRS2, FOM_BP2, FOM_BP2SE, FOM_BP2JK, FOM_BP2BS, FOM_BT2, FOM_BT2SE, FOM_CP2, FOM_CP2SE,
     FOM_SEL1, FOM_SEL1SE, FOM_TOT1, FOM_TOT1SE, FOM_SEL2, FOM_SEL2SE, FOM_TOT2, FOM_TOT2SE,
     FOM_L1, FOM_L1A, FOM_L1ASE, FOM_L1B, FOM_L1BSE, FOM_L2, FOM_L2A, FOM_L2ASE, FOM_L2B, FOM_L2BSE,
-    FOM_LOGDC, FOM_LOGDCERR,
+    FOM_LOGDC, FOM_LOGDCERR, FOM_OPT, FOM_OPTERR,
     FOM_QUANTITIES
 };
 
@@ -47,16 +48,38 @@ struct fom_text {
 };
 extern const struct fom_text fom_column[FOM_QUANTITIES];
 
+/* Sums over the used objects of one of 16 parts of a field, all images of the field. */
+struct fom_block {
+    char field[64];
+    int part;
+    double n, p, s2;          /* number, sum of (P11 + P22)/2, sum of squared e about the image's mean */
+};
+
 struct fom_result {
     char set[64];
+    double lo, hi;            /* the bin; NaN: none */
     double scale;             /* CCDSCALE, arcsec */
     double area;              /* of one image, arcmin^2 */
     long images, fields;
     double v[FOM_QUANTITIES];
+    size_t blocks;
+    struct fom_block *block;
 };
 
-/* Everything one group can tell by itself. Images all of one set and scale. */
+void fom_result_free(struct fom_result *r);
+
+/* Everything one group can tell by itself. Images all of one set and scale. Free with fom_result_free. */
 MUST_CHECK int fom_group(size_t n, const struct fom_image *const *im, const struct fom_options *o, struct fom_result *r);
+
+/*
+ * Scale where sigma^2/(theta n) of a set is least: the lowest point of a
+ * parabola in log theta through the least value and two neighbours on each side
+ * (five scales; fewer at the end of the range), and its spread over draws of
+ * blocks of sky with replacement, the same blocks at all scales that show the
+ * same field.  NaN below four scales, and when it lies at an end of the range.
+ * After fom_compare().
+ */
+MUST_CHECK int fom_optimum(size_t n, struct fom_result *r, const struct fom_options *o);
 
 /*
  * Lines b = a + slope * CCDSCALE through the slopes of each set (three scales

@@ -26,8 +26,11 @@ static int read_keywords(struct fom_image *im, const struct table *t, struct err
             return err_set(e, E_MISSING, "no keyword SHEAR%d: shapes must be measured on an image that has it", k + 1);
     if (table_key_number(t, "CCDSCALE", &im->scale) != OK && table_key_number(t, "PIXSCALE", &im->scale) != OK)
         return err_set(e, E_MISSING, "no keyword CCDSCALE or PIXSCALE");
-    im->area = NAN;
+    im->area = im->epsf[0] = im->epsf[1] = NAN;
     double v;
+    for (int k = 0; k < 2; k++)
+        if (table_key_number(t, k ? "EPSF2" : "EPSF1", &v) == OK)
+            im->epsf[k] = v;
     if (table_key_number(t, "AREA", &v) == OK && v > 0)
         im->area = v;
     for (int k = 0; k < 5; k++) {
@@ -38,7 +41,92 @@ static int read_keywords(struct fom_image *im, const struct table *t, struct err
     return OK;
 }
 
-int fom_image_read(struct fom_image *im, const struct table *t, struct err *e)
+struct place {
+    double x, y;
+    size_t i;
+};
+
+static int by_y(const void *a, const void *b)
+{
+    const struct place *p = a, *q = b;
+    return p->y < q->y ? -1 : p->y > q->y ? 1 : p->i < q->i ? -1 : p->i > q->i;
+}
+
+/* Positions in arcsec about the origin (sky: flat, cos of the origin's declination), sorted by y. */
+static size_t sorted(struct place *p, const struct fom_image *im, const double origin[2])
+{
+    size_t m = 0;
+    double scale = cos(origin[1] * M_PI / 180) * 3600;
+    for (size_t i = 0; i < im->n; i++) {
+        const struct fom_object *o = &im->object[i];
+        if (!isfinite(o->x) || !isfinite(o->y))
+            continue;
+        p[m] = (struct place){o->x, o->y, i};
+        if (im->sky)
+            p[m] = (struct place){remainder(o->x - origin[0], 360) * scale, (o->y - origin[1]) * 3600, i};
+        m++;
+    }
+    qsort(p, m, sizeof *p, by_y);
+    return m;
+}
+
+/* Where the positions are laid flat about: the first that is a number (not on the sky: zero). */
+static void find_origin(const struct fom_image *im, double origin[2])
+{
+    origin[0] = origin[1] = 0;
+    for (size_t i = im->n; im->sky && i-- > 0;)
+        if (isfinite(im->object[i].x) && isfinite(im->object[i].y)) {
+            origin[0] = im->object[i].x;
+            origin[1] = im->object[i].y;
+        }
+}
+
+/* Distance of every object to the nearest other one, arcsec; INFINITY when there is none. */
+static int distances(struct fom_image *im)
+{
+    struct place *p = malloc((im->n + 1) * sizeof *p);
+    if (!p)
+        return E_NOMEM;
+    double origin[2];
+    find_origin(im, origin);
+    size_t m = sorted(p, im, origin);
+    for (size_t k = 0; k < m; k++) {
+        double best = INFINITY;
+        for (size_t j = k + 1; j < m && p[j].y - p[k].y < best; j++)
+            best = fmin(best, hypot(p[j].x - p[k].x, p[j].y - p[k].y));
+        for (size_t j = k; j-- > 0 && p[k].y - p[j].y < best;)
+            best = fmin(best, hypot(p[j].x - p[k].x, p[j].y - p[k].y));
+        im->object[p[k].i].key = best;
+    }
+    free(p);
+    return OK;
+}
+
+static int read_keys(struct fom_image *im, const struct table *t, const char *key, struct err *e)
+{
+    if (strcmp(key, "DISTANCE") == 0)
+        return distances(im) ? err_set(e, E_NOMEM, "%s", err_text(E_NOMEM)) : OK;
+    int snr = strcmp(key, "SNR") == 0 && !table_find(t, key);
+    const struct column *c[2] = {table_find(t, snr ? "FLUX_AUTO" : key), table_find(t, snr ? "FLUXERR_AUTO" : key)};
+    for (int k = 0; k < 2; k++)
+        if (!c[k] || c[k]->type == COL_TEXT || c[k]->type == COL_RAGGED)
+            return err_set(e, E_MISSING, "no column of numbers %s for the bins",
+                           snr ? k ? "FLUXERR_AUTO" : "FLUX_AUTO" : key);
+    for (size_t i = 0; i < im->n; i++)
+        im->object[i].key = snr ? table_number(c[0], i) / table_number(c[1], i) : table_number(c[0], i);
+    return OK;
+}
+
+void fom_image_bin(struct fom_image *im, double lo, double hi)
+{
+    for (size_t i = 0; i < im->n; i++) {
+        struct fom_object *o = &im->object[i];
+        o->listed = o->key >= lo && o->key < hi;
+        o->used = o->passes && o->listed;
+    }
+}
+
+int fom_image_read(struct fom_image *im, const struct table *t, const char *key, struct err *e)
 {
     static const char *const need[] = {"E1", "E2", "E1ERR", "E2ERR", "P11", "P22"};
     const struct column *c[6];
@@ -72,10 +160,16 @@ int fom_image_read(struct fom_image *im, const struct table *t, struct err *e)
             .p = {table_number(c[4], i), table_number(c[5], i)}};
         int good = isfinite(o->e[0]) && isfinite(o->e[1]) && isfinite(o->p[0]) && isfinite(o->p[1]);
         o->measured = good && hypot(o->e[0], o->e[1]) < 2;
-        o->used = good && (!cut || table_number(cut, i) == 0);
+        o->used = o->passes = good && (!cut || table_number(cut, i) == 0);
+        o->listed = 1;
+        o->key = NAN;
     }
-    *im = r;
-    return OK;
+    st = key ? read_keys(&r, t, key, e) : OK;
+    if (st)
+        fom_image_free(&r);
+    else
+        *im = r;
+    return st;
 }
 
 size_t fom_image_used(const struct fom_image *im)
@@ -84,35 +178,6 @@ size_t fom_image_used(const struct fom_image *im)
     for (size_t i = 0; i < im->n; i++)
         n += (size_t)im->object[i].used;
     return n;
-}
-
-struct place {
-    double x, y;
-    size_t i;
-};
-
-static int by_y(const void *a, const void *b)
-{
-    const struct place *p = a, *q = b;
-    return p->y < q->y ? -1 : p->y > q->y ? 1 : p->i < q->i ? -1 : p->i > q->i;
-}
-
-/* Positions in arcsec about the origin (sky: flat, cos of the origin's declination), sorted by y. */
-static size_t sorted(struct place *p, const struct fom_image *im, const double origin[2])
-{
-    size_t m = 0;
-    double scale = cos(origin[1] * M_PI / 180) * 3600;
-    for (size_t i = 0; i < im->n; i++) {
-        const struct fom_object *o = &im->object[i];
-        if (!isfinite(o->x) || !isfinite(o->y))
-            continue;
-        p[m] = (struct place){o->x, o->y, i};
-        if (im->sky)
-            p[m] = (struct place){remainder(o->x - origin[0], 360) * scale, (o->y - origin[1]) * 3600, i};
-        m++;
-    }
-    qsort(p, m, sizeof *p, by_y);
-    return m;
 }
 
 /* near[i] of every object of a: nearest of b within radius, -1 when there is none; both sorted by y. */
@@ -140,12 +205,8 @@ int fom_match(const struct fom_image *a, const struct fom_image *b, double radiu
     long *back = malloc((b->n + 1) * sizeof *back);
     int st = p && q && back ? OK : E_NOMEM;
     if (st == OK) {
-        double origin[2] = {0, 0};
-        for (size_t i = a->n; a->sky && i-- > 0;)
-            if (isfinite(a->object[i].x) && isfinite(a->object[i].y)) {
-                origin[0] = a->object[i].x;
-                origin[1] = a->object[i].y;
-            }
+        double origin[2];
+        find_origin(a, origin);
         for (size_t i = 0; i < a->n; i++)
             to[i] = -1;
         for (size_t j = 0; j < b->n; j++)
@@ -161,4 +222,22 @@ int fom_match(const struct fom_image *a, const struct fom_image *b, double radiu
     free(q);
     free(back);
     return st;
+}
+
+int fom_flat(const struct fom_image *im, double *x, double *y)
+{
+    struct place *p = malloc((im->n + 1) * sizeof *p);
+    double origin[2];
+    if (!p)
+        return E_NOMEM;
+    find_origin(im, origin);
+    size_t m = sorted(p, im, origin);
+    for (size_t i = 0; i < im->n; i++)
+        x[i] = y[i] = NAN;
+    for (size_t k = 0; k < m; k++) {
+        x[p[k].i] = p[k].x;
+        y[p[k].i] = p[k].y;
+    }
+    free(p);
+    return OK;
 }

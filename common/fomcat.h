@@ -13,7 +13,10 @@ struct fom_object {
     double x, y;              /* sky: right ascension and declination, deg; else arcsec */
     double e[2], err[2];
     double p[2];              /* P11, P22 */
-    int used;                 /* passes the cuts and has an ellipticity */
+    double key;               /* what bins are made of; NaN: in no bin */
+    int passes;               /* passes the cuts and has an ellipticity */
+    int listed;               /* its key is in the bin */
+    int used;                 /* both */
     int measured;             /* has an ellipticity below 2 */
 };
 
@@ -21,6 +24,7 @@ struct fom_image {
     char set[64], field[64];  /* SETNAME; FIELDID or SEED: images of one field show the same galaxies */
     double scale;             /* CCDSCALE, arcsec */
     double g[2];              /* SHEAR1, SHEAR2 */
+    double epsf[2];           /* EPSF1, EPSF2: ellipticity of the PSF; NaN: unknown */
     double area;              /* arcmin^2; NaN: unknown */
     double count[5];          /* left after: detection, stars, ellipticity, size, S/N; NaN: unknown */
     int marked;               /* has a column CUT: rows that fail are there too */
@@ -29,8 +33,16 @@ struct fom_image {
     struct fom_object *object;
 };
 
-/* What fom needs of one catalogue. E_MISSING: e names the column or keyword. Free with fom_image_free. */
-MUST_CHECK int fom_image_read(struct fom_image *im, const struct table *t, struct err *e);
+/*
+ * What fom needs of one catalogue; all objects listed.  key: a column of
+ * numbers, or SNR (FLUX_AUTO/FLUXERR_AUTO), or DISTANCE (arcsec to the nearest
+ * other row of the catalogue); NULL: none.  E_MISSING: e names the column or
+ * keyword.  Free with fom_image_free.
+ */
+MUST_CHECK int fom_image_read(struct fom_image *im, const struct table *t, const char *key, struct err *e);
+
+/* List the objects with lo <= key < hi. */
+void fom_image_bin(struct fom_image *im, double lo, double hi);
 void fom_image_free(struct fom_image *im);
 
 /* Number of used objects. */
@@ -41,5 +53,8 @@ size_t fom_image_used(const struct fom_image *im);
  * i of a and whose nearest in a is i, not farther than radius (arcsec); -1: none.
  */
 MUST_CHECK int fom_match(const struct fom_image *a, const struct fom_image *b, double radius, long *to);
+
+/* Positions in arcsec on a plane about one of the objects; NaN where there is none. */
+MUST_CHECK int fom_flat(const struct fom_image *im, double *x, double *y);
 
 #endif

@@ -5,21 +5,30 @@
 #include <string.h>
 
 #define PAIRS 16              /* different |g| of one component */
+#define LEVELS (2 * PAIRS)    /* different values of what the ellipticities answer to */
+#define LEAST_SPAN 0.005      /* of the PSF's ellipticities */
 
 /* One image of a pair, matched to the list of its field. */
 struct side {
     const struct fom_image *im;
     long *at;                 /* object of im for every object of the list; -1: none */
     unsigned char *taken;     /* object of im belongs to one of the list */
-    double weight;            /* +-g / (2 sum g^2) */
-    int slot;                 /* which |g| and sign: means are over all fields */
+    double weight;            /* (x - <x>) / sum (x - <x>)^2 over the levels x */
+    int slot;                 /* which level: means are over all fields */
 };
 
 struct field {
     const struct fom_image *list;
     int has_zero;             /* the list is unsheared */
     size_t n;
-    struct side side[2 * PAIRS];
+    struct side side[LEVELS];
+};
+
+/* The values of shear (or PSF ellipticity) whose slope is taken: all present in every field. */
+struct levels {
+    int n;
+    int psf;
+    double x[LEVELS], weight[LEVELS];
 };
 
 struct sums {
@@ -38,30 +47,48 @@ static int same(double a, double b)
     return fabs(a - b) < 1e-9;
 }
 
-/* The image of this field with shear g in component c and none in the other. */
-static const struct fom_image *find(size_t n, const struct fom_image *const *im, const char *field, int c, double g)
+/* The image of this field at x in component c and, for a shear, at none in the other. */
+static const struct fom_image *find(size_t n, const struct fom_image *const *im, const char *field, int c, int psf, double x)
 {
     for (size_t i = 0; i < n; i++)
-        if (strcmp(im[i]->field, field) == 0 && same(im[i]->g[c], g) && same(im[i]->g[1 - c], 0))
+        if (strcmp(im[i]->field, field) == 0 && same(psf ? im[i]->epsf[c] : im[i]->g[c], x) && (psf || same(im[i]->g[1 - c], 0)))
             return im[i];
     return NULL;
 }
 
-/* Positive shears g of component c that have their opposite in every field; returns how many. */
-static int find_pairs(size_t n, const struct fom_image *const *im, int c, double g[PAIRS])
+/* Every field has an image at x. */
+static int everywhere(size_t n, const struct fom_image *const *im, int c, int psf, double x)
 {
-    int pairs = 0;
-    for (size_t i = 0; i < n; i++) {
-        double v = im[i]->g[c];
-        int known = !(v > 1e-9) || !same(im[i]->g[1 - c], 0);
-        for (int k = 0; k < pairs; k++)
-            known |= same(g[k], v);
-        for (size_t j = 0; j < n && !known; j++)
-            known = !find(n, im, im[j]->field, c, v) || !find(n, im, im[j]->field, c, -v);
-        if (!known && pairs < PAIRS)
-            g[pairs++] = v;
+    for (size_t j = 0; j < n; j++)
+        if (!find(n, im, im[j]->field, c, psf, x))
+            return 0;
+    return 1;
+}
+
+/* Pairs +-g of component c; for the PSF every ellipticity, when they differ enough. */
+static void find_levels(struct levels *l, size_t n, const struct fom_image *const *im, int c, int psf)
+{
+    double mean = 0, norm = 0;
+    *l = (struct levels){.psf = psf};
+    for (size_t i = 0; i < n && l->n < LEVELS; i++) {
+        double v = psf ? im[i]->epsf[c] : im[i]->g[c];
+        int known = psf ? !isfinite(v) : !(v > 1e-9) || !same(im[i]->g[1 - c], 0);
+        for (int k = 0; k < l->n; k++)
+            known |= same(l->x[k], v);
+        if (known || !everywhere(n, im, c, psf, v) || !(psf || everywhere(n, im, c, psf, -v)))
+            continue;
+        l->x[l->n++] = v;
+        if (!psf)
+            l->x[l->n++] = -v;
     }
-    return pairs;
+    for (int k = 0; k < l->n; k++)
+        mean += l->x[k] / l->n;
+    for (int k = 0; k < l->n; k++)
+        norm += (l->x[k] - mean) * (l->x[k] - mean);
+    for (int k = 0; k < l->n; k++)
+        l->weight[k] = (l->x[k] - mean) / norm;
+    if (psf && !(norm > 0.5 * LEAST_SPAN * LEAST_SPAN))
+        l->n = 0;
 }
 
 static void field_free(struct field *f)
@@ -73,20 +100,16 @@ static void field_free(struct field *f)
     f->n = 0;
 }
 
-static int field_open(struct field *f, size_t n, const struct fom_image *const *im, const char *name, int c, int pairs,
-                      const double g[PAIRS], double radius)
+static int field_open(struct field *f, size_t n, const struct fom_image *const *im, const char *name, int c,
+                      const struct levels *l, double radius)
 {
-    double norm = 0;
-    *f = (struct field){.list = find(n, im, name, c, 0)};
+    *f = (struct field){.list = l->psf ? NULL : find(n, im, name, c, 0, 0)};
     f->has_zero = f->list != NULL;
     if (!f->list)
-        f->list = find(n, im, name, c, g[0]);
-    for (int k = 0; k < pairs; k++)
-        norm += 2 * g[k] * g[k];
-    for (int k = 0; k < 2 * pairs; k++) {
-        double v = k % 2 ? -g[k / 2] : g[k / 2];
+        f->list = find(n, im, name, c, l->psf, l->x[0]);
+    for (int k = 0; k < l->n; k++) {
         struct side *s = &f->side[f->n];
-        *s = (struct side){.im = find(n, im, name, c, v), .weight = v / norm, .slot = k};
+        *s = (struct side){.im = find(n, im, name, c, l->psf, l->x[k]), .weight = l->weight[k], .slot = k};
         s->at = malloc((f->list->n + 1) * sizeof *s->at);
         s->taken = calloc(s->im->n + 1, 1);
         f->n++;
@@ -122,17 +145,17 @@ static int add_common(struct common *all, const struct field *f, int c)
     }
     for (size_t i = 0; i < f->list->n; i++) {
         double r = 0, g = 0, p = 0, mean = 0, m = (double)f->n;
-        size_t k = 0;
+        size_t k = f->list->object[i].listed ? 0 : f->n + 1;
         for (; k < f->n; k++) {
             const struct fom_object *o = matched(&f->side[k], i);
-            if (!o || !o->used)
+            if (!o || !o->passes)
                 break;
             r += f->side[k].weight * o->e[c];
             g += 0.5 * (o->p[0] + o->p[1]) / m;
             p += o->p[c] / m;
             mean += o->e[c] / m;
         }
-        if (k < f->n)
+        if (k != f->n)
             continue;
         all->r[all->n] = r;
         all->g[all->n] = g;
@@ -247,23 +270,25 @@ static int is_first(size_t n, const struct fom_image *const *im, size_t i)
     return 1;
 }
 
-int fom_pairs(size_t n, const struct fom_image *const *im, int component, double radius, long draws, uint64_t seed,
-              struct fom_pairs *out)
+int fom_pairs(size_t n, const struct fom_image *const *im, int component, int psf, double radius, long draws,
+              uint64_t seed, struct fom_pairs *out)
 {
     const struct ratio none = {.value = NAN, .se = NAN, .jackknife = NAN, .bootstrap = NAN};
     struct fom_pairs r = {.scalar = none, .tensor = none, .response = NAN, .mean = NAN, .mean_se = NAN, .total = NAN,
                           .total_se = NAN, .selection = NAN, .selection_se = NAN};
-    double g[PAIRS], var[2] = {0};
-    struct sums sum[2 * PAIRS] = {{0}};
+    double var[2] = {0};
+    struct sums sum[LEVELS] = {{0}};
     struct common all = {0};
-    int pairs = find_pairs(n, im, component, g), st = OK;
+    struct levels levels;
+    find_levels(&levels, n, im, component, psf);
+    int st = OK;
     struct field *f = calloc(n + 1, sizeof *f);
     size_t fields = 0;
     if (!f)
         return E_NOMEM;
-    for (size_t i = 0; i < n && pairs > 0 && st == OK; i++)
+    for (size_t i = 0; i < n && levels.n > 0 && st == OK; i++)
         if (is_first(n, im, i)) {
-            st = field_open(&f[fields], n, im, im[i]->field, component, pairs, g, radius);
+            st = field_open(&f[fields], n, im, im[i]->field, component, &levels, radius);
             if (st == OK)
                 st = add_common(&all, &f[fields++], component);
         }

@@ -5,7 +5,8 @@
  * Images of one field show the same galaxies and noise.  For component c its
  * pairs +-g give each common galaxy a response
  *   r = sum_p g_p (e+ - e-) / (2 sum_p g_p^2),
- * free of its own ellipticity; 1 + m = <r>/<G>.  The selection response is the
+ * free of its own ellipticity; 1 + m = <r>/<G>.  With several PSFs in place of
+ * shears, r is the slope against the ellipticity of the PSF and <r>/<G> its leakage.  The selection response is the
  * same sum over mean ellipticities measured without shear, of the objects that
  * pass the cuts with it; the total that of the images' own means.
  */
@@ -29,10 +30,10 @@ struct fom_pairs {
 
 /*
  * Pairs are found among images with the other component zero.  The g = 0 image
- * of a field is its list of galaxies (without one: the first of its pair
- * images, and no selection response).  Undefined values are NaN.
+ * of a field is its list of galaxies (without one, and with psf: the first
+ * image, and no selection response); only galaxies listed there count as common.  Undefined values are NaN.
  */
-MUST_CHECK int fom_pairs(size_t n, const struct fom_image *const *im, int component, double radius, long draws,
-                         uint64_t seed, struct fom_pairs *out);
+MUST_CHECK int fom_pairs(size_t n, const struct fom_image *const *im, int component, int psf, double radius,
+                         long draws, uint64_t seed, struct fom_pairs *out);
 
 #endif

@@ -291,6 +291,17 @@ void table_free(struct table *t)
     *t = (struct table){0};
 }
 
+void table_keep_columns(struct table *t, const unsigned char *keep)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < t->ncol; i++)
+        if (keep[i])
+            t->col[n++] = t->col[i];
+        else
+            column_free(&t->col[i], t->nrow);
+    t->ncol = n;
+}
+
 /* Room for `cap` rows; cells beyond the rows in use are undefined. */
 static int column_reserve(struct column *c, size_t cap)
 {

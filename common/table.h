@@ -81,6 +81,9 @@ MUST_CHECK int table_ragged(struct table *t, struct column *c, size_t row, const
 /* Keep rows with keep[i] != 0, in order. */
 MUST_CHECK int table_keep(struct table *t, const unsigned char *keep);
 
+/* Keep columns with keep[k] != 0, in order. */
+void table_keep_columns(struct table *t, const unsigned char *keep);
+
 /* to = deep copy of from; on failure `to` is empty. */
 MUST_CHECK int table_copy(struct table *to, const struct table *from);
 

@@ -39,6 +39,11 @@ near "nothing survives: a header and no row" "$(grep -vc '^#' none.cat)" 0 0
 ok "an empty catalogue" cutcat none.cat --snr 0 -o none2.cat
 { printf '# Keyword: DSTAR = 0.9\n# WIDTH\n1\n'; } >stars.rrg
 cutcat in.cat --stars stars.rrg -o s.cat; near "--stars wins over the catalogue" "$(key s.cat DSTAR)" 0.9 0
+cutcat in.cat --columns MAG_AUTO,NUMBER -o cols.cat
+near "--columns: in the order of the input" "$(grep '^# NUMBER' cols.cat | tail -1 | grep -cx '# NUMBER MAG_AUTO')" 1 0
+near "--columns: the same rows" "$(col cols.cat NUMBER | tr -d '\n')" 16 0
+cutcat in.cat --columns NUMBER --mark -o cols.cat; near "--columns with --mark" "$(col cols.cat CUT | tr -d '\n')" "012640484" 0
+fails "--columns: no such column" 1 cutcat in.cat --columns NUMBER,MAG
 fails "star file without DSTAR" 1 cutcat in.cat --stars stars.rrg --dstar own
 grep -v DSTAR in.cat >nod.cat; fails "no d* anywhere" 1 cutcat nod.cat
 fails "malformed comparison" 2 cutcat in.cat --where 'MAG_AUTO<x'

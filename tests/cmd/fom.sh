@@ -48,6 +48,40 @@ near "selection bias" "$(col sel.cat MSEL1)" -0.5284 "$(awk -v s="$(col sel.cat 
 near "measurement bias: none" "$(col sel.cat BPAIR1)" 1 1e-6
 near "total = measurement + selection" "$(paste <(col sel.cat MTOT1) <(col sel.cat MSEL1) | awk '{ print $1 - $2 }')" 0 0.03
 
+# bins: galaxies with NUMBER up to 200 answer by 0.9, the others by 1.1; DISTANCE of a grid of 30 x 30 pixels of 0.1"
+for k in 0 1 2 3 4 5 6 7 8; do g=$(key a$k SHEAR1) h=$(key a$k SHEAR2)
+    awk -v g="$g" -v h="$h" '/^#/ { print; next } { s = $1 <= 200 ? -0.05 : 0.15; $4 += 1.25 * s * g; $5 += 1.25 * s * h; print }' a$k >bin$k; done
+ok "bins of a column" fom bin? --bins NUMBER:0,200.5,1000 -o bins.cat
+near "a row for each bin" "$(col bins.cat BINLO | tr '\n' ' ' | tr -d ' ')" 0200.5 0
+near "slope of the first bin" "$(col bins.cat BPAIR1 | head -1)" 0.9 1e-6
+near "slope of the second bin" "$(col bins.cat BPAIR2 | tail -1)" 1.1 1e-6
+near "objects of the first bin" "$(col bins.cat NPAIR1 | head -1)" 200 0
+near "both bins together" "$(fom bin? -q -o both.cat; col both.cat BPAIR1)" 1 1e-6
+ok "bins of the distance" fom a? --bins DISTANCE:0,2.9,3.1,9 -q -o dist.cat
+near "all of a grid have neighbours at 3 arcsec" "$(col dist.cat NPAIR1 | tr '\n' ' ' | tr -d ' ')" 04000 0
+fails "bins without edges" 2 fom a0 --bins NUMBER
+fails "bins of falling edges" 2 fom a0 --bins NUMBER:2,1
+fails "bins of an unknown column" 1 fom a0 --bins MAG:1,2
+fails "bins of SNR without fluxes" 1 fom a0 --bins SNR:1,2
+
+# leakage: e = e0 + 1.25 0.03 e_psf, two PSFs of e1 = +-0.05
+for k in 1 -1; do awk -v s=$k '/^#/ { print; if (!n++) printf "# Keyword: EPSF1 = %s\n# Keyword: EPSF2 = 0.001\n", 0.002 + 0.05 * s; next } { $4 += 1.25 * 0.03 * 0.05 * s; print }' a0 >psf$k; done
+ok "leakage" fom --against psf psf1 psf-1 -q -o leak.cat
+near "leakage: slope against the PSF" "$(col leak.cat BPAIR1)" 0.03 1e-6
+near "no spread of PSFs in component 2: undefined" "$(col leak.cat BPAIR2 | grep -c nan)" 1 0
+fails "leakage without the PSF's ellipticity" 1 fom --against psf a0 a1
+
+# the best scale: spread 1/theta with n ~ exp(-(theta/.1)^2): y = theta^-1 / n is least at theta = .1/sqrt 2
+for x in 0.04 0.05 0.06 0.07 0.08 0.09 0.10; do
+    for g in "0.05 0" "-0.05 0" "0 0.05" "0 -0.05"; do shapes "opt$x $g" opt $x $g 1 "$(awk "BEGIN { print int(3000 * exp(-($x / .1) ^ 2)) }")" 5; done; done
+ok "best scale" fom opt0.*" "* -q -o opt.cat
+between "best scale, arcsec" "$(col opt.cat OPTSCALE | head -1)" 0.066 0.076
+between "its error" "$(col opt.cat OPTSCALEERR | head -1)" 0.0001 0.01
+ok "three scales are too few" fom opt0.04* opt0.07* opt0.10* -q -o opt3.cat
+near "three scales: undefined" "$(col opt3.cat OPTSCALE | sort -u | grep -c nan)" 1 0
+ok "five scales, least at the end of the range" fom opt0.04* opt0.05* opt0.06* opt0.07* -q --draws 0 -o opt4.cat
+near "least at the end: a minimum beyond it is not given" "$(col opt4.cat OPTSCALE | head -1 | awk '{ print ($1 == "nan" || $1 < 0.07) }')" 1 0
+
 # undefined, exit 0, a warning
 shapes few0 few 0.10 0 0 1 3 9; shapes few1 few 0.10 0.05 0 1 3 9
 ok "three galaxies" fom few0 few1 -o few.cat

@@ -36,7 +36,9 @@ static struct fom_image image(const struct world *w, const double g[2], double s
             o->p[c] = response;
         }
         o->measured = 1;
-        o->used = w->limit == 0 || o->e[0] < w->limit;
+        o->listed = 1;
+        o->key = (double)(i % 4);
+        o->used = o->passes = w->limit == 0 || o->e[0] < w->limit;
     }
     return im;
 }
@@ -48,7 +50,7 @@ static struct fom_result measure(const struct world *w, double scale, int fields
 {
     struct fom_image im[27];
     const struct fom_image *p[27] = {0};
-    struct fom_result r = {{0}, 0, 0, 0, 0, {0}};
+    struct fom_result r = {0};
     size_t n = 0;
     for (int f = 0; f < fields; f++)
         for (int k = 0; k < 9; k++, n++) {

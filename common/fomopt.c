@@ -1,0 +1,175 @@
+/* fomopt.c - the pixel scale of the least power spectrum error, and how well it is known. */
+#include "fom.h"
+#include "stats.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LEAST_SCALES 4
+
+/* One set: its scales in rising order, and the blocks of sky they share. */
+struct curve {
+    size_t n;                 /* scales */
+    const struct fom_result **r;
+    uint32_t **label;         /* of every block of every scale, 0..labels-1 */
+    size_t labels;
+    double *theta, *y;        /* log scale, log of sigma^2/(theta n) */
+};
+
+static int by_scale(const void *a, const void *b)
+{
+    const struct fom_result *const *p = a, *const *q = b;
+    return (*p)->scale < (*q)->scale ? -1 : (*p)->scale > (*q)->scale;
+}
+
+static int same_set(const struct fom_result *a, const struct fom_result *b)
+{
+    return strcmp(a->set, b->set) == 0 && (a->lo == b->lo || (isnan(a->lo) && isnan(b->lo)));
+}
+
+/* Equal labels for equal (field, part): parts come in groups of 16 in order. */
+static void set_labels(struct curve *c)
+{
+    c->labels = 0;
+    for (size_t i = 0; i < c->n; i++)
+        for (size_t k = 0; k < c->r[i]->blocks; k += 16) {
+            size_t found = c->labels;
+            for (size_t a = 0; a < i && found == c->labels; a++)
+                for (size_t b = 0; b < c->r[a]->blocks && found == c->labels; b += 16)
+                    if (strcmp(c->r[a]->block[b].field, c->r[i]->block[k].field) == 0)
+                        found = c->label[a][b];
+            for (size_t j = 0; j < 16; j++)
+                c->label[i][k + j] = (uint32_t)(found + j);
+            c->labels += found == c->labels ? 16 : 0;
+        }
+}
+
+/* y of every scale when block `label` counts weight[label] times (NULL: once). */
+static void weigh(struct curve *c, const double *weight)
+{
+    for (size_t i = 0; i < c->n; i++) {
+        const struct fom_result *r = c->r[i];
+        double n = 0, p = 0, s2 = 0, area = 0;
+        for (size_t k = 0; k < r->blocks; k++) {
+            double w = weight ? weight[c->label[i][k]] : 1;
+            area += w;
+            n += w * r->block[k].n;
+            p += w * r->block[k].p;
+            s2 += w * r->block[k].s2;
+        }
+        double line = 0.5 * (r->v[FOM_L1] + r->v[FOM_L2]), spread = s2 * n / (p * p * line * line);
+        c->theta[i] = log(r->scale);
+        c->y[i] = log(spread * area / n) - c->theta[i];
+    }
+}
+
+/* Vertex of the least-squares parabola through up to five points about the least; NaN at an end. */
+static double lowest(size_t n, const double *x, const double *y)
+{
+    size_t at = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (!isfinite(y[i]))
+            return NAN;
+        at = y[i] < y[at] ? i : at;
+    }
+    size_t lo = at > 2 ? at - 2 : 0, hi = at + 2 < n ? at + 2 : n - 1;
+    double s[5] = {0}, t[3] = {0}, x0 = x[at];
+    for (size_t i = lo; i <= hi; i++) {
+        double d = x[i] - x0, power = 1;
+        for (int k = 0; k < 5; k++, power *= d) {
+            s[k] += power;
+            if (k < 3)
+                t[k] += power * (y[i] - y[at]);
+        }
+    }
+    double det = s[0] * (s[2] * s[4] - s[3] * s[3]) - s[1] * (s[1] * s[4] - s[2] * s[3]) + s[2] * (s[1] * s[3] - s[2] * s[2]);
+    double b = s[0] * (t[1] * s[4] - s[3] * t[2]) - t[0] * (s[1] * s[4] - s[2] * s[3]) + s[2] * (s[1] * t[2] - t[1] * s[2]);
+    double a = s[0] * (s[2] * t[2] - t[1] * s[3]) - s[1] * (s[1] * t[2] - t[1] * s[2]) + t[0] * (s[1] * s[3] - s[2] * s[2]);
+    if (!(a / det > 0))
+        return NAN;
+    double v = x0 - 0.5 * b / a;
+    return v > x[0] && v < x[n - 1] ? exp(v) : NAN;
+}
+
+static double spread_of_draws(struct curve *c, const struct fom_options *o, double *weight, uint32_t *index, double *v)
+{
+    size_t used = 0;
+    struct stats s;
+    for (long k = 0; k < o->draws; k++) {
+        memset(weight, 0, c->labels * sizeof *weight);
+        stats_resample(c->labels, c->labels, o->seed, (uint64_t)k, index);
+        for (size_t i = 0; i < c->labels; i++)
+            weight[index[i]]++;
+        weigh(c, weight);
+        v[used] = lowest(c->n, c->theta, c->y);
+        used += isfinite(v[used]) ? 1 : 0;
+    }
+    stats_sum(used, v, &s);
+    /* an optimum that many draws cannot find has no error */
+    return 2 * used > (size_t)o->draws ? sqrt(s.var) : NAN;
+}
+
+/* The scales of r[first]'s set into c; its arrays have room for n. */
+static int collect(struct curve *c, size_t n, const struct fom_result *r, size_t first)
+{
+    c->n = 0;
+    for (size_t i = 0; i < n; i++)
+        if (same_set(&r[i], &r[first]) && r[i].blocks > 0)
+            c->r[c->n++] = &r[i];
+    qsort(c->r, c->n, sizeof *c->r, by_scale);
+    for (size_t i = 0; i < c->n; i++) {
+        c->label[i] = malloc(c->r[i]->blocks * sizeof **c->label);
+        if (!c->label[i])
+            return E_NOMEM;
+    }
+    set_labels(c);
+    return OK;
+}
+
+static int optimum_of_set(size_t n, struct fom_result *r, size_t first, const struct fom_options *o, struct curve *c)
+{
+    double at = NAN, err = NAN;
+    int st = collect(c, n, r, first);
+    double *weight = malloc((c->labels + 1) * sizeof *weight), *v = malloc(((size_t)o->draws + 1) * sizeof *v);
+    uint32_t *index = malloc((c->labels + 1) * sizeof *index);
+    if (!weight || !v || !index)
+        st = E_NOMEM;
+    if (st == OK && c->n >= LEAST_SCALES) {
+        weigh(c, NULL);
+        at = lowest(c->n, c->theta, c->y);
+        if (isfinite(at))
+            err = spread_of_draws(c, o, weight, index, v);
+    }
+    for (size_t i = 0; i < n && st == OK; i++)
+        if (same_set(&r[i], &r[first])) {
+            r[i].v[FOM_OPT] = at;
+            r[i].v[FOM_OPTERR] = err;
+        }
+    free(weight);
+    free(v);
+    free(index);
+    return st;
+}
+
+int fom_optimum(size_t n, struct fom_result *r, const struct fom_options *o)
+{
+    struct curve c = {.r = calloc(n + 1, sizeof *c.r), .label = calloc(n + 1, sizeof *c.label),
+                      .theta = calloc(n + 1, sizeof *c.theta), .y = calloc(n + 1, sizeof *c.y)};
+    int st = c.r && c.label && c.theta && c.y ? OK : E_NOMEM;
+    for (size_t i = 0; i < n && st == OK; i++) {
+        size_t j = 0;
+        while (j < i && !same_set(&r[j], &r[i]))
+            j++;
+        if (j == i)
+            st = optimum_of_set(n, r, i, o, &c);
+        for (size_t k = 0; k < n; k++) {
+            free(c.label[k]);
+            c.label[k] = NULL;
+        }
+    }
+    free(c.r);
+    free(c.label);
+    free(c.theta);
+    free(c.y);
+    return st;
+}
