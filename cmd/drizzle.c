@@ -22,7 +22,7 @@
 
 enum units { UNITS_TOTAL, UNITS_MEAN, UNITS_RATE };
 
-enum { BAND_BYTES = 16 << 20, CHUNK_PIXELS = 1 << 19, MAX_EXPOSURES = 4096 };
+enum { BAND_BYTES = 16 << 20, CACHE_BYTES = 4 << 20, CHUNK_PIXELS = 1 << 19, MAX_EXPOSURES = 4096 };
 
 struct request {
     double scale, pixfrac, fill;
@@ -61,7 +61,7 @@ struct work {
 /* A band of output rows and what is being added to it. */
 struct band {
     long y0, ny;
-    double *flux, *weight;
+    double *sum;             /* pairs of flux and weight */
     uint32_t *context;       /* planes of ny rows, or NULL */
     float *pix, *map;        /* rows of the exposure */
     const struct shot *shot;
@@ -147,11 +147,16 @@ static void add_file(struct work *w, size_t k)
 
 /* ---- order of the exposures ---- */
 
+/* n bytes, a multiple of 4: FNV-1a over words, folded. */
 static void hash(uint64_t *key, const void *data, size_t n)
 {
     const unsigned char *p = data;
-    for (size_t i = 0; i < n; i++)
-        *key = (*key ^ p[i]) * 0x100000001B3u;         /* FNV-1a */
+    for (size_t i = 0; i < n; i += 4) {
+        uint32_t word;
+        memcpy(&word, p + i, 4);
+        *key = (*key ^ word) * 0x100000001B3u;
+        *key ^= *key >> 32;
+    }
 }
 
 static void hash_pixels(uint64_t *key, struct fits_in *f, int index, long nx, long ny)
@@ -457,7 +462,7 @@ static int add_parts(void *ctx, long begin, long end, int worker)
         const long from = b->ny * i / b->parts, to = b->ny * (i + 1) / b->parts;
         const size_t at = (size_t)from * (size_t)w->nx;
         struct drizzle_band part = {
-            .nx = w->nx, .y0 = b->y0 + from, .ny = to - from, .flux = b->flux + at, .weight = b->weight + at,
+            .nx = w->nx, .y0 = b->y0 + from, .ny = to - from, .sum = b->sum + 2 * at,
             .context = b->plane ? b->plane + at : NULL,
         };
         if (to > from)
@@ -466,15 +471,31 @@ static int add_parts(void *ctx, long begin, long end, int worker)
     return st;
 }
 
+/* Rows *first..*end-1 of an exposure hold all that an affine map sends to rows low..high of the output. */
+static void needed_rows(const struct shot *s, double low, double high, long *first, long *end)
+{
+    const struct drizzle_map *m = &s->map;
+    *first = 0;
+    *end = s->x.ny;
+    if (m->node_x || !(fabs(m->yy) > 1e-12))
+        return;
+    const double across = m->yx * (double)(s->x.nx - 1), lean = fmin(0, across), rest = fmax(0, across);
+    const double p = (low - rest - m->y0) / m->yy, q = (high - lean - m->y0) / m->yy;
+    *first = (long)fmax(0, fmin(floor(fmin(p, q)), (double)s->x.ny));
+    *end = (long)fmin((double)s->x.ny, fmax(ceil(fmax(p, q)) + 1, 0));
+}
+
 /* All rows of one exposure that reach the band. */
 static int add_shot(struct work *w, struct band *b, const struct shot *s, struct err *e)
 {
     const long rows = 1 + CHUNK_PIXELS / s->x.nx;
     const double reach = drizzle_reach((enum drizzle_kernel)w->r.kernel, w->r.pixfrac, &s->map) + 1;
     void *ctx[2] = {b, w};
+    long first, end;
     b->shot = s;
-    for (long y = 0; y < s->x.ny; y += rows) {
-        const long here = s->x.ny - y < rows ? s->x.ny - y : rows;
+    needed_rows(s, (double)b->y0 - reach, (double)(b->y0 + b->ny) + reach, &first, &end);
+    for (long y = first; y < end; y += rows) {
+        const long here = end - y < rows ? end - y : rows;
         double lo[2], hi[2];
         drizzle_map_bounds(&s->map, -0.5, (double)y - 0.5, (double)s->x.nx - 0.5, (double)(y + here) - 0.5, lo, hi);
         if (hi[1] < (double)b->y0 - reach || lo[1] > (double)(b->y0 + b->ny) + reach)
@@ -535,11 +556,11 @@ static int write_band(const struct work *w, struct band *b, struct fits_out *out
     if (!v)
         return err_set(e, E_NOMEM, "output: %s", err_text(E_NOMEM));
     for (size_t i = 0; i < n; i++)
-        v[i] = b->weight[i] != 0 ? (float)(b->flux[i] / b->weight[i]) : (float)w->r.fill;
+        v[i] = b->sum[2 * i + 1] != 0 ? (float)(b->sum[2 * i] / b->sum[2 * i + 1]) : (float)w->r.fill;
     int st = fits_out_rows(out, b->ny, v, e);
     if (st == OK && sp->weight) {
         for (size_t i = 0; i < n; i++)
-            v[i] = (float)b->weight[i];
+            v[i] = (float)b->sum[2 * i + 1];
         st = spool_add(sp->weight, v, n, e);
         for (size_t p = 0; p < sp->planes && st == OK; p++)
             st = spool_add(sp->context[p], b->context + p * n, n, e);
@@ -605,16 +626,24 @@ static long widest(const struct work *w)
     return nx;
 }
 
+/* 1 when rows of every exposure fall on rows of the output: no row is read for two bands. */
+static int upright(const struct work *w)
+{
+    for (size_t i = 0; i < w->n; i++)
+        if (w->shot[i].map.node_x || w->shot[i].map.yx != 0)
+            return 0;
+    return 1;
+}
+
 /* SCI, band by band. */
 static int fill_bands(struct work *w, struct fits_out *out, struct spool *sp, struct err *e)
 {
     const size_t cell = 2 * sizeof(double) + sp->planes * sizeof(uint32_t);
-    long rows = (long)(BAND_BYTES / ((size_t)w->nx * cell));
+    long rows = (long)((upright(w) ? CACHE_BYTES : BAND_BYTES) / ((size_t)w->nx * cell));
     rows = rows < 16 ? 16 : rows > w->ny ? w->ny : rows;
     const size_t n = (size_t)rows * (size_t)w->nx, chunk = (size_t)(CHUNK_PIXELS + widest(w));
     struct band b = {.parts = w->c->threads};
-    b.flux = room(n, sizeof *b.flux);
-    b.weight = room(n, sizeof *b.weight);
+    b.sum = room(2 * n, sizeof *b.sum);
     b.context = sp->planes ? room(n * sp->planes, sizeof *b.context) : NULL;
     b.pix = room(chunk, sizeof *b.pix);
     b.map = w->r.weights.n ? room(chunk, sizeof *b.map) : NULL;
@@ -622,8 +651,7 @@ static int fill_bands(struct work *w, struct fits_out *out, struct spool *sp, st
     for (b.y0 = 0; b.y0 < w->ny && st == OK; b.y0 += rows) {
         b.ny = w->ny - b.y0 < rows ? w->ny - b.y0 : rows;
         const size_t here = (size_t)b.ny * (size_t)w->nx;
-        memset(b.flux, 0, here * sizeof *b.flux);
-        memset(b.weight, 0, here * sizeof *b.weight);
+        memset(b.sum, 0, 2 * here * sizeof *b.sum);
         if (b.context)
             memset(b.context, 0, here * sp->planes * sizeof *b.context);
         for (size_t i = 0; i < w->n && st == OK; i++) {
@@ -634,8 +662,7 @@ static int fill_bands(struct work *w, struct fits_out *out, struct spool *sp, st
         if (st == OK)
             st = write_band(w, &b, out, sp, e);
     }
-    free(b.flux);
-    free(b.weight);
+    free(b.sum);
     free(b.context);
     free(b.pix);
     free(b.map);

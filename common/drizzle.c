@@ -8,9 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define GRID_START 64
-#define AFFINE_ERROR 3e-7     /* px */
-#define PARALLEL 5e-7         /* px over the image */
 #define SMALL 9.6e-7          /* a drop of this side is a point */
 #define LEAST 1e-12           /* parts of a drop below this are rounding */
 #define FWHM_SIGMA 2.3548
@@ -20,169 +17,6 @@ static double rounded(double v)
 {
     const double magic = 0x1.8p32;
     return (v + magic) - magic;
-}
-
-/* ---- maps ---- */
-
-static void affine_at(const struct drizzle_map *m, double x, double y, double *X, double *Y)
-{
-    *X = m->x0 + m->xx * x + m->xy * y;
-    *Y = m->y0 + m->yx * x + m->yy * y;
-}
-
-void drizzle_map_at(const struct drizzle_map *m, double x, double y, double *X, double *Y)
-{
-    if (!m->node_x) {
-        affine_at(m, x, y, X, Y);
-        return;
-    }
-    const double gx = (x + 1) / (double)m->step, gy = (y + 1) / (double)m->step;
-    long i = (long)gx, j = (long)gy;
-    i = i < 0 ? 0 : i > m->gx - 2 ? m->gx - 2 : i;
-    j = j < 0 ? 0 : j > m->gy - 2 ? m->gy - 2 : j;
-    const double u = gx - (double)i, v = gy - (double)j;
-    const size_t k = (size_t)j * (size_t)m->gx + (size_t)i, l = k + (size_t)m->gx;
-    const double *px = m->node_x, *py = m->node_y;
-    *X = (1 - v) * (px[k] + u * (px[k + 1] - px[k])) + v * (px[l] + u * (px[l + 1] - px[l]));
-    *Y = (1 - v) * (py[k] + u * (py[k + 1] - py[k])) + v * (py[l] + u * (py[l + 1] - py[l]));
-}
-
-void drizzle_map_bounds(const struct drizzle_map *m, double x0, double y0, double x1, double y1,
-                        double lo[2], double hi[2])
-{
-    const double step = m->node_x ? (double)m->step : INFINITY, slack = m->node_x ? 1e-3 : 1e-6;
-    lo[0] = lo[1] = INFINITY;
-    hi[0] = hi[1] = -INFINITY;
-    /* a bilinear cell has its extremes in its corners, so nodes and borders suffice */
-    for (double y = y0;; y = fmin(y1, (floor((y + 1) / step) + 1) * step - 1)) {
-        for (double x = x0;; x = fmin(x1, (floor((x + 1) / step) + 1) * step - 1)) {
-            double p[2];
-            drizzle_map_at(m, x, y, &p[0], &p[1]);
-            for (int k = 0; k < 2; k++) {
-                lo[k] = fmin(lo[k], p[k] - slack);
-                hi[k] = fmax(hi[k], p[k] + slack);
-            }
-            if (!(x < x1))
-                break;
-        }
-        if (!(y < y1))
-            break;
-    }
-}
-
-/* Largest distance of the map from the transformation over a lattice of nx x ny points. */
-static int worst_error(const struct drizzle_map *m, double x0, double y0, double dx, double dy, long nx, long ny,
-                       drizzle_transform *fn, void *ctx, double *worst)
-{
-    double *b = malloc(4 * (size_t)nx * sizeof *b);
-    if (!b)
-        return E_NOMEM;
-    double *x = b, *y = b + nx, *X = y + nx, *Y = X + nx;
-    int st = OK;
-    for (long j = 0; j < ny && st == OK; j++) {
-        for (long i = 0; i < nx; i++) {
-            x[i] = x0 + dx * (double)i;
-            y[i] = y0 + dy * (double)j;
-        }
-        st = fn(ctx, (size_t)nx, x, y, X, Y);
-        for (long i = 0; i < nx && st == OK; i++) {
-            double px, py;
-            drizzle_map_at(m, x[i], y[i], &px, &py);
-            double e = fmax(fabs(px - X[i]), fabs(py - Y[i]));
-            if (!(e <= *worst))
-                *worst = isnan(e) ? INFINITY : e;
-        }
-    }
-    free(b);
-    return st;
-}
-
-/* Affine map through three corners; *error is its worst on an 17 x 17 lattice. */
-static int fit_affine(struct drizzle_map *m, long nx, long ny, drizzle_transform *fn, void *ctx, double *error)
-{
-    const double w = (double)nx, h = (double)ny;
-    const double x[3] = {-0.5, w - 0.5, -0.5}, y[3] = {-0.5, -0.5, h - 0.5};
-    double X[3], Y[3];
-    int st = fn(ctx, 3, x, y, X, Y);
-    if (st)
-        return st;
-    m->xx = (X[1] - X[0]) / w;
-    m->xy = (X[2] - X[0]) / h;
-    m->yx = (Y[1] - Y[0]) / w;
-    m->yy = (Y[2] - Y[0]) / h;
-    const double most = fmax(w, h);
-    if (fabs(m->xy) * most < PARALLEL && fabs(m->yx) * most < PARALLEL)
-        m->xy = m->yx = 0;
-    if (fabs(m->xx) * most < PARALLEL && fabs(m->yy) * most < PARALLEL)
-        m->xx = m->yy = 0;
-    m->x0 = X[0] + 0.5 * (m->xx + m->xy);
-    m->y0 = Y[0] + 0.5 * (m->yx + m->yy);
-    return worst_error(m, -0.5, -0.5, w / 16, h / 16, 17, 17, fn, ctx, error);
-}
-
-/* Nodes every m->step pixels from -1 to beyond the far side. */
-static int fill_grid(struct drizzle_map *m, long nx, long ny, drizzle_transform *fn, void *ctx)
-{
-    m->gx = (nx + 1) / m->step + 2;
-    m->gy = (ny + 1) / m->step + 2;
-    const size_t n = (size_t)m->gx * (size_t)m->gy;
-    m->node_x = malloc(n * sizeof *m->node_x);
-    m->node_y = malloc(n * sizeof *m->node_y);
-    double *x = malloc(2 * (size_t)m->gx * sizeof *x);
-    int st = m->node_x && m->node_y && x ? OK : E_NOMEM;
-    for (long j = 0; j < m->gy && st == OK; j++) {
-        for (long i = 0; i < m->gx; i++) {
-            x[i] = (double)(i * m->step - 1);
-            x[m->gx + i] = (double)(j * m->step - 1);
-        }
-        const size_t k = (size_t)j * (size_t)m->gx;
-        st = fn(ctx, (size_t)m->gx, x, x + m->gx, m->node_x + k, m->node_y + k);
-    }
-    free(x);
-    return st;
-}
-
-int drizzle_map_make(struct drizzle_map *m, long nx, long ny, drizzle_transform *fn, void *ctx)
-{
-    if (nx < 1 || ny < 1)
-        return E_RANGE;
-    struct drizzle_map new = {0};
-    double error = 0;
-    int st = fit_affine(&new, nx, ny, fn, ctx, &error);
-    for (long step = GRID_START; st == OK && !(error <= (new.node_x ? DRIZZLE_MAP_ERROR : AFFINE_ERROR)); step /= 2) {
-        drizzle_map_free(&new);
-        if (step < 1)
-            return E_NOCONV;
-        new.step = step;
-        st = fill_grid(&new, nx, ny, fn, ctx);
-        const double half = 0.5 * (double)step;
-        error = 0;
-        if (st == OK && step > 1)
-            st = worst_error(&new, -1 + half, -1, half, half, 2 * new.gx - 3, 2 * new.gy - 1, fn, ctx, &error);
-    }
-    if (st == OK) {
-        const double cx = 0.5 * (double)(nx - 1), cy = 0.5 * (double)(ny - 1);
-        double ax, ay, bx, by, px, py, qx, qy;
-        drizzle_map_at(&new, cx - 0.5, cy, &ax, &ay);
-        drizzle_map_at(&new, cx + 0.5, cy, &bx, &by);
-        drizzle_map_at(&new, cx, cy - 0.5, &px, &py);
-        drizzle_map_at(&new, cx, cy + 0.5, &qx, &qy);
-        new.scale = sqrt(fabs((bx - ax) * (qy - py) - (by - ay) * (qx - px)));
-        if (!(new.scale > 1e-9 && new.scale < 1e9))
-            st = E_SINGULAR;
-    }
-    if (st)
-        drizzle_map_free(&new);
-    else
-        *m = new;
-    return st;
-}
-
-void drizzle_map_free(struct drizzle_map *m)
-{
-    free(m->node_x);
-    free(m->node_y);
-    m->node_x = m->node_y = NULL;
 }
 
 /* ---- drops ---- */
@@ -228,85 +62,127 @@ static double part_of(const struct span *s, long i)
 }
 
 /* Weight of pixel i of an input row; 0 for what must not count. */
-static double weight_at(const struct drizzle_input *in, size_t i)
+static inline double weight_at(const struct drizzle_input *in, size_t i)
 {
-    if (!in->weight)
-        return isnan(in->pix[i]) ? 0 : in->w;
-    const double w = in->w * (double)in->weight[i];
-    return w > 0 && !isnan(in->pix[i]) ? w : 0;
+    const double w = in->weight ? in->w * (double)in->weight[i] : in->w;
+    const int good = !isnan(in->pix[i]) && !(in->bad && in->bad[i]) && !(in->var && !(in->var[i] >= 0));
+    return w > 0 && w < INFINITY && good ? w : 0;
 }
 
-static inline void put(struct drizzle_band *b, size_t at, double flux, double weight, uint32_t bit)
+/* One input pixel: value and variance in the output's unit, weight, bit of its exposure. */
+struct drop {
+    double d, v, w;
+    uint32_t bit;
+};
+
+/* 0 when pixel i of the input does not count. */
+static inline int drop_at(const struct drizzle_input *in, size_t i, struct drop *p)
 {
-    b->flux[at] += flux;
-    b->weight[at] += weight;
+    p->w = weight_at(in, i);
+    p->d = in->scale * (double)in->pix[i];
+    p->v = in->var ? in->scale * in->scale * (double)in->var[i] : 0;
+    p->bit = in->bit;
+    return p->w > 0;
+}
+
+/* Part a of a drop on pixel `at`. */
+static inline void put(struct drizzle_band *b, size_t at, const struct drop *p, double wa)
+{
+    b->sum[2 * at] += wa * p->d;
+    b->sum[2 * at + 1] += wa;
     if (b->context)
-        b->context[at] |= bit;
+        b->context[at] |= p->bit;
+    if (b->var)
+        b->var[at] += wa * wa * p->v;
 }
 
 /* The drop of spans x and y. */
-static void put_box(struct job *j, const struct span *x, const struct span *y, double d, double w)
+static void put_box(struct job *j, const struct span *x, const struct span *y, const struct drop *p)
 {
     struct drizzle_band *b = j->band;
     const long top = b->y0 + b->ny - 1;
     b->split |= x->last > x->first || y->last > y->first;
     for (long r = y->first < b->y0 ? b->y0 : y->first; r <= (y->last < top ? y->last : top); r++) {
-        const double wr = w * part_of(y, r);
+        const double wr = p->w * part_of(y, r);
         const size_t at = (size_t)(r - b->y0) * (size_t)b->nx;
-        for (long c = x->first < 0 ? 0 : x->first; c <= (x->last < b->nx - 1 ? x->last : b->nx - 1); c++) {
-            const double wa = wr * part_of(x, c);
-            put(b, at + (size_t)c, wa * d, wa, j->in->bit);
-        }
+        for (long c = x->first < 0 ? 0 : x->first; c <= (x->last < b->nx - 1 ? x->last : b->nx - 1); c++)
+            put(b, at + (size_t)c, p, wr * part_of(x, c));
+    }
+}
+
+/* What an aligned map does with each column. */
+struct columns {
+    struct span *span;
+    int *cell;               /* the one cell of the band that gets all, -1: see the span */
+};
+
+/* Drops of a row that fall on one cell each; `sum` and `context` are those of the output row. */
+static void row_copied(const struct drizzle_input *in, const float *pix, const int *cell, double *sum, uint32_t *context)
+{
+    const double w = in->w, scale = in->scale;
+    for (long x = 0; x < in->nx; x++) {
+        const double d = scale * (double)pix[x];
+        const long c = cell[x];
+        if (c < 0 || isnan(d))
+            continue;
+        sum[2 * c] += w * d;
+        sum[2 * c + 1] += w;
+        if (context)
+            context[c] |= in->bit;
+    }
+}
+
+/* One row of drops between the spans of its columns and s. */
+static void row_boxes(struct job *j, const struct columns *col, const struct span *s, size_t row)
+{
+    const struct drizzle_input *in = j->in;
+    struct drizzle_band *b = j->band;
+    const size_t at = (size_t)(s->first - b->y0) * (size_t)b->nx;
+    const int single = s->first == s->last;
+    for (long x = 0; x < in->nx; x++) {
+        struct drop p;
+        if (!drop_at(in, row + (size_t)x, &p))
+            continue;
+        if (single && col->cell[x] >= 0)
+            put(b, at + (size_t)col->cell[x], &p, p.w);
+        else
+            put_box(j, &col->span[x], s, &p);
     }
 }
 
 /* Axes along axes: every column has its span, every row one. */
-static void drop_aligned(struct job *j, const struct span *columns)
+static int rows_aligned(struct job *j)
 {
     const struct drizzle_map *m = j->map;
     const struct drizzle_input *in = j->in;
     struct drizzle_band *b = j->band;
     const double half = 0.5 * j->pixfrac;
-    for (long y = 0; y < in->ny; y++) {
-        const double Y = (double)(in->y0 + y);
-        const struct span s = span_of(m->y0 + m->yy * Y, half * m->yy);
+    const size_t n = (size_t)in->nx;
+    struct columns col = {malloc(n * sizeof *col.span), malloc(n * sizeof *col.cell)};
+    const int st = col.span && col.cell ? OK : E_NOMEM;
+    int split = 0;
+    for (size_t x = 0; x < n && st == OK; x++) {
+        const struct span s = col.span[x] = span_of(m->x0 + m->xx * (double)x, half * m->xx);
+        col.cell[x] = s.first == s.last && s.first >= 0 && s.first < b->nx ? (int)s.first : -1;
+        split |= s.last > s.first;
+    }
+    for (long y = 0; y < in->ny && st == OK; y++) {
+        const struct span s = span_of(m->y0 + m->yy * (double)(in->y0 + y), half * m->yy);
+        const size_t row = (size_t)y * n, at = (size_t)(s.first - b->y0) * (size_t)b->nx;
         if (s.last < b->y0 || s.first >= b->y0 + b->ny)
             continue;
-        const size_t row = (size_t)y * (size_t)in->nx;
-        const size_t at = (size_t)(s.first - b->y0) * (size_t)b->nx;
-        for (long x = 0; x < in->nx; x++) {
-            const struct span *c = &columns[x];
-            const double w = weight_at(in, row + (size_t)x);
-            if (!(w > 0))
-                continue;
-            const double d = in->scale * (double)in->pix[row + (size_t)x];
-            if (s.first == s.last && c->first == c->last) {
-                if (c->first >= 0 && c->first < b->nx)
-                    put(b, at + (size_t)c->first, w * d, w, in->bit);
-            } else {
-                put_box(j, c, &s, d, w);
-            }
-        }
+        if (!split && s.first == s.last && !in->weight && !in->bad && !in->var && in->w > 0)
+            row_copied(in, in->pix + row, col.cell, b->sum + 2 * at, b->context ? b->context + at : NULL);
+        else
+            row_boxes(j, &col, &s, row);
     }
-}
-
-static int rows_aligned(struct job *j)
-{
-    const struct drizzle_map *m = j->map;
-    const double half = 0.5 * j->pixfrac;
-    struct span *columns = malloc((size_t)j->in->nx * sizeof *columns);
-    if (!columns)
-        return E_NOMEM;
-    for (long x = 0; x < j->in->nx; x++) {
-        columns[x] = span_of(m->x0 + m->xx * (double)x, half * m->xx);
-    }
-    drop_aligned(j, columns);
-    free(columns);
-    return OK;
+    free(col.span);
+    free(col.cell);
+    return st;
 }
 
 /* Any quadrilateral. */
-static void put_quad(struct job *j, const double X[4], const double Y[4], double d, double w)
+static void put_quad(struct job *j, const double X[4], const double Y[4], const struct drop *p)
 {
     struct drizzle_band *b = j->band;
     const double area = overlap_area(X, Y);
@@ -317,7 +193,7 @@ static void put_quad(struct job *j, const double X[4], const double Y[4], double
     if (!(fabs(area) > SMALL * SMALL)) {
         const struct span px = span_of(0.5 * (x0 + x1) - 0.5, 0);
         const struct span py = span_of(0.5 * (y0 + y1) - 0.5, 0);
-        put_box(j, &px, &py, d, w);
+        put_box(j, &px, &py, p);
         return;
     }
     long first = (long)floor(x0), last = (long)ceil(x1) - 1, low = (long)floor(y0), high = (long)ceil(y1) - 1;
@@ -332,41 +208,19 @@ static void put_quad(struct job *j, const double X[4], const double Y[4], double
         for (long c = 0; c <= last - first; c++) {
             const double a = j->row[c] / area;
             if (a > LEAST)
-                put(b, at + (size_t)c, w * a * d, w * a, j->in->bit);
+                put(b, at + (size_t)c, p, p->w * a);
         }
     }
-}
-
-/* Any map: centre and corners are rounded apart where it is affine, so that all drops have one shape. */
-static void drop_square(struct job *j, double x, double y, double d, double w)
-{
-    static const double side[4][2] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
-    const struct drizzle_map *m = j->map;
-    double X[4], Y[4], cx = 0, cy = 0;
-    if (!m->node_x)
-        affine_at(m, x, y, &cx, &cy);
-    for (int k = 0; k < 4; k++) {
-        const double u = j->pixfrac * side[k][0], v = j->pixfrac * side[k][1];
-        if (m->node_x) {
-            drizzle_map_at(m, x + u, y + v, &X[k], &Y[k]);
-        } else {
-            X[k] = m->xx * u + m->xy * v;
-            Y[k] = m->yx * u + m->yy * v;
-        }
-        X[k] = rounded(X[k]) + rounded(cx) + 0.5;
-        Y[k] = rounded(Y[k]) + rounded(cy) + 0.5;
-    }
-    put_quad(j, X, Y, d, w);
 }
 
 /* A square of the mean scale along the output axes; a point when pixfrac is 0. */
-static void drop_box(struct job *j, double x, double y, double d, double w)
+static void drop_box(struct job *j, double x, double y, const struct drop *p)
 {
     const double half = j->kernel == DRIZZLE_POINT ? 0 : 0.5 * j->pixfrac * j->map->scale;
     double X, Y;
     drizzle_map_at(j->map, x, y, &X, &Y);
     const struct span sx = span_of(X, half), sy = span_of(Y, half);
-    put_box(j, &sx, &sy, d, w);
+    put_box(j, &sx, &sy, p);
 }
 
 static double sinc(double x)
@@ -397,7 +251,7 @@ double drizzle_reach(enum drizzle_kernel kernel, double pixfrac, const struct dr
 }
 
 /* Gaussian and Lanczos: values at pixel centres. */
-static void drop_smooth(struct job *j, double x, double y, double d, double w)
+static void drop_smooth(struct job *j, double x, double y, const struct drop *p)
 {
     struct drizzle_band *b = j->band;
     const double side = j->pixfrac * j->map->scale, reach = drizzle_reach(j->kernel, j->pixfrac, j->map) - 1;
@@ -422,34 +276,37 @@ static void drop_smooth(struct job *j, double x, double y, double d, double w)
     }
     for (long r = y0; r <= y1; r++) {
         const double t = (double)r - Y;
-        const double line = w * (gauss ? steep / M_PI * exp(-steep * t * t) : lanczos(t / side, order));
+        const double line = p->w * (gauss ? steep / M_PI * exp(-steep * t * t) : lanczos(t / side, order));
         const size_t at = (size_t)(r - b->y0) * (size_t)b->nx;
-        for (long c = x0; c <= x1; c++) {
-            const double wa = line * j->row[c - x0];
-            put(b, at + (size_t)c, wa * d, wa, j->in->bit);
-        }
+        for (long c = x0; c <= x1; c++)
+            put(b, at + (size_t)c, p, line * j->row[c - x0]);
     }
 }
 
-/* ---- parallelograms: the square kernel of an affine map ---- */
+/* ---- the square kernel of any map: OVERLAP_LANES drops at a time ---- */
 
-enum { WINDOW = 8, STRIDE = WINDOW + 2 };    /* cells; larger drops take put_quad */
+static inline long below(double v)
+{
+    const long i = (long)v;
+    return i - (v < (double)i);
+}
 
-/* An edge of the drop from its lower to its upper end, relative to the drop's centre. */
-struct edge {
-    double ax, ay, bx, by;
-    double x_per_y, step;    /* dx/dy; |dy/dx| * rise */
-    double rise;             /* part of the drop to the right of 1 pixel of height */
-};
+/* Cells that an interval of this length can touch. */
+static int cells(double length)
+{
+    const double n = ceil(length) + 1;
+    return n < 2 ? 2 : n <= OVERLAP_WINDOW ? (int)n : OVERLAP_WINDOW + 1;
+}
 
+/* The drop of an affine map, relative to its centre; corners are multiples of 2^-20. */
 struct shape {
-    struct edge edge[4];
-    int edges;               /* level ones are left out: nothing lies to their right */
-    double x[4], y[4];       /* corners, multiples of 2^-20 */
+    struct overlap_edges edges;      /* the same in every lane */
+    double x[4], y[4];
     double x0, x1, y0, y1;
+    int nx, ny;                      /* window, cells */
 };
 
-/* 0 when the shape has no area. */
+/* 0 when the shape has no area or is too large. */
 static int shape_make(struct shape *s, const struct drizzle_map *m, double pixfrac)
 {
     static const double side[4][2] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
@@ -462,123 +319,269 @@ static int shape_make(struct shape *s, const struct drizzle_map *m, double pixfr
     s->x1 = fmax(fmax(s->x[0], s->x[1]), fmax(s->x[2], s->x[3]));
     s->y0 = fmin(fmin(s->y[0], s->y[1]), fmin(s->y[2], s->y[3]));
     s->y1 = fmax(fmax(s->y[0], s->y[1]), fmax(s->y[2], s->y[3]));
-    s->edges = 0;
-    for (int k = 0; k < 4; k++) {
-        const int l = (k + 1) & 3, up = s->y[l] > s->y[k], lo = up ? k : l, hi = up ? l : k;
-        const double dx = s->x[hi] - s->x[lo], dy = s->y[hi] - s->y[lo];
-        if (!(dy > 0))
-            continue;
-        const double rise = (up ? -1 : 1) / area;
-        s->edge[s->edges++] = (struct edge){
-            .ax = s->x[lo], .ay = s->y[lo], .bx = s->x[hi], .by = s->y[hi],
-            .x_per_y = dx / dy, .rise = rise, .step = dx < 0 || dx > 0 ? rise * fabs(dy / dx) : 0,
-        };
-    }
-    return fabs(area) > SMALL * SMALL;
-}
-
-/* A piece of an edge inside one row of cells, from x = xa <= xb, with h to its right. */
-static inline void piece(double *sum, double xa, double xb, double h, double step)
-{
-    const int ia = (int)xa, ib = (int)xb;
-    if (ia == ib) {
-        const double m = h * (0.5 * (xa + xb) - ia);
-        sum[ia] += h - m;
-        sum[ia + 1] += m;
-        return;
-    }
-    const double first = ia + 1 - xa, last = xb - ib;
-    const double p = step * first, q = 0.5 * p * first;
-    sum[ia] += q;
-    sum[ia + 1] += p - q;
-    for (int i = ia + 1; i < ib; i++) {
-        sum[i] += 0.5 * step;
-        sum[i + 1] += 0.5 * step;
-    }
-    const double t = step * last, u = 0.5 * t * last;
-    sum[ib] += t - u;
-    sum[ib + 1] += u;
-}
-
-/* Adds the edges of a shape centred at (X, Y) of the window; as overlap_row, for all rows. */
-static inline void cover(const struct shape *s, double X, double Y, double *sum)
-{
-    for (int k = 0; k < s->edges; k++) {
-        const struct edge *e = &s->edge[k];
-        const double ax = X + e->ax, ay = Y + e->ay, by = Y + e->by;
-        double x = ax, y = ay;
-        int r = (int)ay;
-        for (;;) {
-            const int end = r + 1 >= by;
-            const double top = end ? by : r + 1, next = end ? X + e->bx : ax + (top - ay) * e->x_per_y;
-            const double h = e->rise * (top - y);
-            if (x < next)
-                piece(sum + r * STRIDE, x, next, h, e->step);
-            else
-                piece(sum + r * STRIDE, next, x, h, e->step);
-            if (end)
-                break;
-            x = next;
-            y = top;
-            r++;
+    s->nx = cells(s->x1 - s->x0);
+    s->ny = cells(s->y1 - s->y0);
+    if (!(fabs(area) > SMALL * SMALL) || s->nx > OVERLAP_WINDOW || s->ny > OVERLAP_WINDOW)
+        return 0;
+    double x[4][OVERLAP_LANES], y[4][OVERLAP_LANES], factor[OVERLAP_LANES];
+    for (int i = 0; i < OVERLAP_LANES; i++) {
+        factor[i] = 1 / area;
+        for (int k = 0; k < 4; k++) {
+            x[k][i] = s->x[k];
+            y[k][i] = s->y[k];
         }
     }
+    overlap_edges_make(&s->edges, x, y, factor);
+    return 1;
 }
 
-static inline long below(double v)
+/* Drops waiting for their areas. */
+struct batch {
+    int n, nx, ny;
+    struct drop drop[OVERLAP_LANES];
+    long i0[OVERLAP_LANES], j0[OVERLAP_LANES];           /* corner of the window */
+    double fx[OVERLAP_LANES], fy[OVERLAP_LANES];         /* centre in the window, of a shape */
+    double x[OVERLAP_LANES];                             /* input pixel, of a grid's drop */
+    double X[4][OVERLAP_LANES], Y[4][OVERLAP_LANES];     /* its corners */
+    int odd[OVERLAP_LANES];                              /* must go through put_quad */
+    struct overlap_edges edges;
+    double area[OVERLAP_WINDOW * OVERLAP_WINDOW * OVERLAP_LANES];
+};
+
+/* Flux and weight of a pixel as one. */
+typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
+
+/* A drop whose window lies in the band. */
+static inline __attribute__((always_inline))
+void spread(double *sum, size_t stride, const double *area, int nx, int ny, const struct drop *p)
 {
-    const long i = (long)v;
-    return i - (v < (double)i);
+    const pair d = {p->d, 1};
+    for (int r = 0; r < ny; r++, sum += stride)
+        for (int c = 0; c < nx; c++, area += OVERLAP_LANES) {
+            const double wa = p->w * *area;
+            *(pair *)(sum + 2 * c) += (pair){wa, wa} * d;
+        }
 }
 
-/* One drop at (X, Y), in cells. */
-static inline void drop_shape(struct job *j, const struct shape *s, double X, double Y, double d, double w)
+static void mark(uint32_t *context, size_t stride, const double *area, int nx, int ny, uint32_t bit)
+{
+    for (int r = 0; r < ny; r++, context += stride)
+        for (int c = 0; c < nx; c++, area += OVERLAP_LANES)
+            context[c] |= *area > 0 ? bit : 0;
+}
+
+/* What of it falls on the band. */
+static void spread_part(struct drizzle_band *b, const struct batch *t, int l)
+{
+    const long j1 = b->y0 + b->ny;
+    for (long r = t->j0[l] < b->y0 ? b->y0 : t->j0[l]; r < t->j0[l] + t->ny && r < j1; r++)
+        for (long c = t->i0[l] < 0 ? 0 : t->i0[l]; c < t->i0[l] + t->nx && c < b->nx; c++) {
+            const double a = t->area[((r - t->j0[l]) * t->nx + c - t->i0[l]) * OVERLAP_LANES + l];
+            if (a > 0)
+                put(b, (size_t)((r - b->y0) * b->nx + c), &t->drop[l], t->drop[l].w * a);
+        }
+}
+
+static void flush(struct job *j, struct batch *t)
 {
     struct drizzle_band *b = j->band;
-    if (!(X + s->x1 > 0 && X + s->x0 < (double)b->nx && Y + s->y1 > (double)b->y0
-          && Y + s->y0 < (double)(b->y0 + b->ny)))
+    if (t->n == 0)
         return;
-    const long i0 = below(X + s->x0), j0 = below(Y + s->y0);
-    const int nx = (int)(below(X + s->x1) - i0) + 1, ny = (int)(below(Y + s->y1) - j0) + 1;
-    double sum[WINDOW * STRIDE];
-    for (int i = 0; i < ny * STRIDE; i++)
-        sum[i] = 0;
-    cover(s, X - (double)i0, Y - (double)j0, sum);
-    const int c0 = i0 < 0 ? (int)-i0 : 0, c1 = i0 + nx > b->nx ? (int)(b->nx - i0) : nx;
-    const int r0 = j0 < b->y0 ? (int)(b->y0 - j0) : 0, r1 = j0 + ny > b->y0 + b->ny ? (int)(b->y0 + b->ny - j0) : ny;
+    overlap_lanes(&t->edges, t->nx, t->ny, LEAST, t->area);
     b->split = 1;
-    for (int r = r0; r < r1; r++) {
-        const size_t at = (size_t)((j0 + r - b->y0) * b->nx + i0 + c0);
-        const double *line = sum + r * STRIDE;
-        double *flux = b->flux + at, *weight = b->weight + at;
-        double a = 0;
-        for (int c = 0; c < c0; c++)
-            a += line[c];
-        for (int c = c0; c < c1; c++) {
-            a += line[c];
-            if (a > LEAST) {
-                const double wa = w * a;
-                flux[c - c0] += wa * d;
-                weight[c - c0] += wa;
-                if (b->context)
-                    b->context[at + (size_t)(c - c0)] |= j->in->bit;
-            }
+    for (int l = 0; l < t->n; l++) {
+        const long i = t->i0[l], r = t->j0[l] - b->y0;
+        const struct drop *p = &t->drop[l];
+        if (t->odd[l]) {
+            const double X[4] = {t->X[0][l], t->X[1][l], t->X[2][l], t->X[3][l]};
+            const double Y[4] = {t->Y[0][l], t->Y[1][l], t->Y[2][l], t->Y[3][l]};
+            put_quad(j, X, Y, p);
+            continue;
         }
+        const int inside = i >= 0 && i + t->nx <= b->nx && r >= 0 && r + t->ny <= b->ny && fabs(p->d) < INFINITY;
+        if (!inside || b->var) {
+            spread_part(b, t, l);
+            continue;
+        }
+        const size_t at = (size_t)r * (size_t)b->nx + (size_t)i, stride = (size_t)b->nx;
+        double *sum = b->sum + 2 * at;
+        if (t->nx == 3 && t->ny == 3)
+            spread(sum, 2 * stride, t->area + l, 3, 3, p);
+        else if (t->nx == 4 && t->ny == 4)
+            spread(sum, 2 * stride, t->area + l, 4, 4, p);
+        else
+            spread(sum, 2 * stride, t->area + l, t->nx, t->ny, p);
+        if (b->context)
+            mark(b->context + at, stride, t->area + l, t->nx, t->ny, p->bit);
     }
+    t->n = 0;
 }
 
-/* Pixels lo..hi of one row. */
-WIDE static void row_shapes(struct job *j, const struct shape *s, long y, long lo, long hi)
+/* The edges of a shape to the centres of a batch. */
+WIDE static void place(const struct shape *s, struct batch *t)
+{
+    for (int k = 0; k < 4; k++) {
+        const struct overlap_edges *e = &s->edges;
+        struct overlap_edges *to = &t->edges;
+        for (int i = 0; i < OVERLAP_LANES; i++) {
+            to->ax[k][i] = t->fx[i] + e->ax[k][i];
+            to->bx[k][i] = t->fx[i] + e->bx[k][i];
+            to->ay[k][i] = t->fy[i] + e->ay[k][i];
+            to->by[k][i] = t->fy[i] + e->by[k][i];
+        }
+    }
+    t->nx = s->nx;
+    t->ny = s->ny;
+}
+
+/* Pixels lo..hi of one row, an affine map; centre and corners are rounded apart, so that all drops have one shape. */
+static void row_shapes(struct job *j, const struct shape *s, struct batch *t, long y, long lo, long hi)
 {
     const struct drizzle_map *m = j->map;
     const struct drizzle_input *in = j->in;
+    const struct drizzle_band *b = j->band;
     const size_t row = (size_t)(y - in->y0) * (size_t)in->nx;
     const double X0 = m->x0 + m->xy * (double)y, Y0 = m->y0 + m->yy * (double)y;
+    const double right = (double)b->nx, low = (double)b->y0, high = (double)(b->y0 + b->ny);
+    memcpy(&t->edges, &s->edges, sizeof t->edges);
     for (long x = lo; x <= hi; x++) {
-        const double w = weight_at(in, row + (size_t)x);
-        if (w > 0)
-            drop_shape(j, s, rounded(X0 + m->xx * (double)x) + 0.5, rounded(Y0 + m->yx * (double)x) + 0.5,
-                       in->scale * (double)in->pix[row + (size_t)x], w);
+        const double X = rounded(X0 + m->xx * (double)x) + 0.5, Y = rounded(Y0 + m->yx * (double)x) + 0.5;
+        const int l = t->n;
+        if (!drop_at(in, row + (size_t)x, &t->drop[l])
+            || !(X + s->x1 > 0 && X + s->x0 < right && Y + s->y1 > low && Y + s->y0 < high))
+            continue;
+        t->i0[l] = below(X + s->x0);
+        t->j0[l] = below(Y + s->y0);
+        t->fx[l] = X - (double)t->i0[l];
+        t->fy[l] = Y - (double)t->j0[l];
+        if (++t->n == OVERLAP_LANES) {
+            place(s, t);
+            flush(j, t);
+        }
+    }
+    if (t->n)
+        place(s, t);
+    flush(j, t);
+}
+
+/* Pixels lo..hi of one row, drops of an affine map that no window holds. */
+static void row_large(struct job *j, long y, long lo, long hi)
+{
+    static const double side[4][2] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
+    const struct drizzle_map *m = j->map;
+    const size_t row = (size_t)(y - j->in->y0) * (size_t)j->in->nx;
+    for (long x = lo; x <= hi; x++) {
+        double X[4], Y[4], cx, cy;
+        struct drop p;
+        if (!drop_at(j->in, row + (size_t)x, &p))
+            continue;
+        drizzle_map_at(m, (double)x, (double)y, &cx, &cy);
+        for (int k = 0; k < 4; k++) {
+            const double u = j->pixfrac * side[k][0], v = j->pixfrac * side[k][1];
+            X[k] = rounded(m->xx * u + m->xy * v) + rounded(cx) + 0.5;
+            Y[k] = rounded(m->yx * u + m->yy * v) + rounded(cy) + 0.5;
+        }
+        put_quad(j, X, Y, &p);
+    }
+}
+
+/* Two lines of a grid, through the lower and the upper corners of a row of drops. */
+struct lines {
+    double *X[2], *Y[2];
+};
+
+/* The node to the left, for interpolation. */
+static inline int node(const struct drizzle_map *m, double g)
+{
+    const int n = (int)g, last = (int)m->gx - 2;
+    return n < 0 ? 0 : n > last ? last : n;
+}
+
+/* The corners of a batch, rounded, in cells. */
+WIDE static void corners(const struct drizzle_map *m, double pixfrac, const struct lines *s, struct batch *t)
+{
+    static const double side[4] = {-0.5, 0.5, 0.5, -0.5};
+    const double per_pixel = 1 / (double)m->step;            /* a power of two */
+    for (int k = 0; k < 4; k++) {
+        const double shift = 1 + pixfrac * side[k], *X = s->X[k / 2], *Y = s->Y[k / 2];
+        const int one = node(m, (t->x[0] + shift) * per_pixel);
+        if (one == node(m, (t->x[t->n - 1] + shift) * per_pixel)) {
+            const double x0 = X[one], x1 = X[one + 1], y0 = Y[one], y1 = Y[one + 1];
+            for (int i = 0; i < OVERLAP_LANES; i++) {
+                const double u = (t->x[i] + shift) * per_pixel - one;
+                t->X[k][i] = rounded(x0 + u * (x1 - x0)) + 0.5;
+                t->Y[k][i] = rounded(y0 + u * (y1 - y0)) + 0.5;
+            }
+            continue;
+        }
+        for (int i = 0; i < OVERLAP_LANES; i++) {
+            const double g = (t->x[i] + shift) * per_pixel;
+            const int n = node(m, g);
+            const double u = g - n;
+            t->X[k][i] = rounded(X[n] + u * (X[n + 1] - X[n])) + 0.5;
+            t->Y[k][i] = rounded(Y[n] + u * (Y[n + 1] - Y[n])) + 0.5;
+        }
+    }
+}
+
+static inline double least4(double a, double b, double c, double d)
+{
+    const double p = a < b ? a : b, q = c < d ? c : d;
+    return p < q ? p : q;
+}
+
+static inline double most4(double a, double b, double c, double d)
+{
+    return -least4(-a, -b, -c, -d);
+}
+
+/* Windows and edges of a batch of corners. */
+static void frame(struct batch *t)
+{
+    double x[4][OVERLAP_LANES], y[4][OVERLAP_LANES], factor[OVERLAP_LANES];
+    double (*X)[OVERLAP_LANES] = t->X, (*Y)[OVERLAP_LANES] = t->Y;
+    t->nx = t->ny = 2;
+    for (int i = 0; i < t->n; i++) {
+        const double area = 0.5 * ((X[2][i] - X[0][i]) * (Y[3][i] - Y[1][i]) - (X[3][i] - X[1][i]) * (Y[2][i] - Y[0][i]));
+        const double x0 = least4(X[0][i], X[1][i], X[2][i], X[3][i]), x1 = most4(X[0][i], X[1][i], X[2][i], X[3][i]);
+        const double y0 = least4(Y[0][i], Y[1][i], Y[2][i], Y[3][i]), y1 = most4(Y[0][i], Y[1][i], Y[2][i], Y[3][i]);
+        const long i0 = below(x0), j0 = below(y0);
+        const double fi = (double)i0, fj = (double)j0, wide = x1 - fi, high = y1 - fj;
+        t->odd[i] = !(fabs(area) > SMALL * SMALL) || !(wide <= OVERLAP_WINDOW) || !(high <= OVERLAP_WINDOW);
+        t->i0[i] = i0;
+        t->j0[i] = j0;
+        factor[i] = t->odd[i] ? 0 : 1 / area;
+        for (int k = 0; k < 4; k++) {
+            x[k][i] = t->odd[i] ? 0 : X[k][i] - fi;
+            y[k][i] = t->odd[i] ? 0 : Y[k][i] - fj;
+        }
+        if (!t->odd[i]) {
+            t->nx = wide > t->nx ? (int)(wide + 0.9999999) : t->nx;
+            t->ny = high > t->ny ? (int)(high + 0.9999999) : t->ny;
+        }
+    }
+    for (int i = t->n; i < OVERLAP_LANES; i++) {
+        factor[i] = 0;
+        for (int k = 0; k < 4; k++)
+            x[k][i] = y[k][i] = 0;
+    }
+    overlap_edges_make(&t->edges, x, y, factor);
+}
+
+/* Pixels lo..hi of one row, a map with a grid. */
+static void row_quads(struct job *j, struct batch *t, const struct lines *s, long y, long lo, long hi)
+{
+    const size_t row = (size_t)(y - j->in->y0) * (size_t)j->in->nx;
+    drizzle_map_line(j->map, (double)y - 0.5 * j->pixfrac, s->X[0], s->Y[0]);
+    drizzle_map_line(j->map, (double)y + 0.5 * j->pixfrac, s->X[1], s->Y[1]);
+    for (long x = lo; x <= hi; x++) {
+        if (drop_at(j->in, row + (size_t)x, &t->drop[t->n]))
+            t->x[t->n++] = (double)x;
+        if (t->n == OVERLAP_LANES || (x == hi && t->n)) {
+            corners(j->map, j->pixfrac, s, t);
+            frame(t);
+            flush(j, t);
+        }
     }
 }
 
@@ -595,6 +598,23 @@ static void narrow(double c, double m, double a, double b, double *lo, double *h
     *hi = fmin(*hi, fmax(p, q));
 }
 
+/* Pixels lo..hi of row y of the image, any kernel but square. */
+static void row_others(struct job *j, long y, long lo, long hi)
+{
+    const struct drizzle_input *in = j->in;
+    const size_t row = (size_t)(y - in->y0) * (size_t)in->nx;
+    const int box = j->kernel == DRIZZLE_POINT || j->kernel == DRIZZLE_TURBO;
+    for (long x = lo; x <= hi; x++) {
+        struct drop p;
+        if (!drop_at(in, row + (size_t)x, &p))
+            continue;
+        if (box)
+            drop_box(j, (double)x, (double)y, &p);
+        else
+            drop_smooth(j, (double)x, (double)y, &p);
+    }
+}
+
 /* Every pixel of the rows whose drop can reach the band. */
 static int rows_general(struct job *j)
 {
@@ -603,41 +623,37 @@ static int rows_general(struct job *j)
     const struct drizzle_band *b = j->band;
     const double reach = drizzle_reach(j->kernel, j->pixfrac, m) + 1;
     const double low = (double)b->y0 - reach, high = (double)(b->y0 + b->ny) + reach;
-    struct shape shape = {.edges = 0};
-    const int shaped = j->kernel == DRIZZLE_SQUARE && !m->node_x && shape_make(&shape, m, j->pixfrac)
-        && shape.x1 - shape.x0 < WINDOW - 2 && shape.y1 - shape.y0 < WINDOW - 2;
+    const size_t gx = m->node_x ? (size_t)m->gx : 1;
+    struct shape *shape = malloc(sizeof *shape);
+    struct batch *t = calloc(1, sizeof *t);
+    double *line = malloc(4 * gx * sizeof *line);
     j->row = malloc(((size_t)b->nx + 2) * sizeof *j->row);
-    if (!j->row)
-        return E_NOMEM;
-    for (long y = 0; y < in->ny; y++) {
-        const double Y = (double)(in->y0 + y);
+    const int st = shape && t && line && j->row ? OK : E_NOMEM;
+    const int square = j->kernel == DRIZZLE_SQUARE;
+    const struct lines lines = {{line, line + gx}, {line + 2 * gx, line + 3 * gx}};
+    const int shaped = st == OK && square && !m->node_x && shape_make(shape, m, j->pixfrac);
+    for (long y = in->y0; y < in->y0 + in->ny && st == OK; y++) {
         double lo = 0, hi = (double)(in->nx - 1);
         if (!m->node_x) {
-            narrow(m->x0 + m->xy * Y, m->xx, -reach, (double)b->nx + reach, &lo, &hi);
-            narrow(m->y0 + m->yy * Y, m->yx, low, high, &lo, &hi);
+            narrow(m->x0 + m->xy * (double)y, m->xx, -reach, (double)b->nx + reach, &lo, &hi);
+            narrow(m->y0 + m->yy * (double)y, m->yx, low, high, &lo, &hi);
         }
         if (!(lo <= hi))
             continue;
-        if (shaped) {
-            row_shapes(j, &shape, in->y0 + y, (long)ceil(lo), (long)hi);
-            continue;
-        }
-        const size_t row = (size_t)y * (size_t)in->nx;
-        for (long x = (long)ceil(lo); x <= (long)hi; x++) {
-            const double w = weight_at(in, row + (size_t)x);
-            if (!(w > 0))
-                continue;
-            const double d = in->scale * (double)in->pix[row + (size_t)x];
-            if (j->kernel == DRIZZLE_SQUARE)
-                drop_square(j, (double)x, Y, d, w);
-            else if (j->kernel == DRIZZLE_POINT || j->kernel == DRIZZLE_TURBO)
-                drop_box(j, (double)x, Y, d, w);
-            else
-                drop_smooth(j, (double)x, Y, d, w);
-        }
+        if (shaped)
+            row_shapes(j, shape, t, y, (long)ceil(lo), (long)hi);
+        else if (square && m->node_x)
+            row_quads(j, t, &lines, y, (long)ceil(lo), (long)hi);
+        else if (square)
+            row_large(j, y, (long)ceil(lo), (long)hi);
+        else
+            row_others(j, y, (long)ceil(lo), (long)hi);
     }
     free(j->row);
-    return OK;
+    free(line);
+    free(shape);
+    free(t);
+    return st;
 }
 
 int drizzle_rows(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map,

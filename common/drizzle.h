@@ -53,6 +53,9 @@ MUST_CHECK int drizzle_map_make(struct drizzle_map *m, long nx, long ny, drizzle
 void drizzle_map_free(struct drizzle_map *m);
 void drizzle_map_at(const struct drizzle_map *m, double x, double y, double *X, double *Y);
 
+/* The m->gx positions at x = -1, step - 1, ... of the line y of a grid; between them the map is linear. */
+void drizzle_map_line(const struct drizzle_map *m, double y, double *X, double *Y);
+
 /* lo[2], hi[2]: bounds of the image of the rectangle [x0,x1] x [y0,y1], grown for a grid by 1e-3. */
 void drizzle_map_bounds(const struct drizzle_map *m, double x0, double y0, double x1, double y1,
                         double lo[2], double hi[2]);
@@ -61,7 +64,9 @@ void drizzle_map_bounds(const struct drizzle_map *m, double x0, double y0, doubl
 struct drizzle_input {
     long nx, y0, ny;
     const float *pix;        /* nx * ny; NaN counts as weight 0 */
-    const float *weight;     /* the same, or NULL; NaN and <= 0 count as 0 */
+    const float *weight;     /* the same, or NULL; NaN, infinite and <= 0 count as 0 */
+    const float *var;        /* variance of pix, or NULL; NaN and < 0 count as weight 0 */
+    const unsigned char *bad;    /* not 0: weight 0; or NULL */
     double w;                /* weight of the exposure, multiplied with the map */
     double scale;            /* s above */
     uint32_t bit;            /* set in `context` where the exposure contributes */
@@ -70,7 +75,8 @@ struct drizzle_input {
 /* Some rows of the output. */
 struct drizzle_band {
     long nx, y0, ny;
-    double *flux, *weight;   /* nx * ny, added to */
+    double *sum;             /* nx * ny pairs of flux and weight, added to */
+    double *var;             /* nx * ny or NULL: sum of (w a s)^2 var */
     uint32_t *context;       /* nx * ny or NULL */
     int split;               /* set when a drop falls on more than one pixel */
 };

@@ -17,6 +17,36 @@ static double uni(uint64_t i, uint32_t k)
     return rng_uniform(&R, i, k);
 }
 
+/* A band with flux and weight in planes. */
+struct planes {
+    long nx, y0, ny;
+    double *flux, *weight;
+    uint32_t *context;
+    int split;
+};
+
+static int add_rows(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *m,
+                    const struct drizzle_input *in, struct planes *p)
+{
+    const size_t n = (size_t)(p->nx * p->ny);
+    double *sum = malloc(2 * n * sizeof *sum);
+    struct drizzle_band b = {.nx = p->nx, .y0 = p->y0, .ny = p->ny, .sum = sum, .context = p->context, .split = p->split};
+    if (!sum)
+        exit(1);
+    for (size_t i = 0; i < n; i++) {
+        sum[2 * i] = p->flux[i];
+        sum[2 * i + 1] = p->weight[i];
+    }
+    const int st = drizzle_rows(kernel, pixfrac, m, in, &b);
+    for (size_t i = 0; i < n; i++) {
+        p->flux[i] = sum[2 * i];
+        p->weight[i] = sum[2 * i + 1];
+    }
+    p->split = b.split;
+    free(sum);
+    return st;
+}
+
 /* ---- reference: clip a polygon at the four sides of a cell ---- */
 
 static int clip_side(int n, double (*p)[2], int axis, double at, int keep_above, double (*q)[2])
@@ -131,8 +161,8 @@ static void against_clip(void)
                 sum += (double)pix[i] * (double)wht[i];
         }
         struct drizzle_input in = {.nx = NI, .ny = NI, .pix = pix, .weight = wht, .w = 1, .scale = 1};
-        struct drizzle_band band = {.nx = NO, .ny = NO, .flux = flux, .weight = weight};
-        if (drizzle_rows(DRIZZLE_SQUARE, pf, &m, &in, &band))
+        struct planes band = {.nx = NO, .ny = NO, .flux = flux, .weight = weight};
+        if (add_rows(DRIZZLE_SQUARE, pf, &m, &in, &band))
             check_that(0, "map %lu", (unsigned long)n);
         reference(&m, pf, pix, wht, rf, rw);
         for (int i = 0; i < NO * NO; i++) {
@@ -159,13 +189,13 @@ static void interlace(void)
     long bad = 0;
     memset(flux, 0, sizeof flux);
     memset(weight, 0, sizeof weight);
-    struct drizzle_band b = {.nx = 2 * N, .ny = 2 * N, .flux = flux, .weight = weight};
+    struct planes b = {.nx = 2 * N, .ny = 2 * N, .flux = flux, .weight = weight};
     for (int e = 0; e < 4; e++) {
         for (int i = 0; i < N * N; i++)
             in[e][i] = (float)(428 + 20 * (uni((uint64_t)i, (uint32_t)e) - 0.5));
         struct drizzle_map m = {.x0 = phase[e][0] + 1e-8, .y0 = phase[e][1] - 2e-8, .xx = 2 + 1e-9, .yy = 2 - 1e-9, .scale = 2};
         struct drizzle_input x = {.nx = N, .ny = N, .pix = in[e], .w = 500, .scale = 0.25 * (2000 / 500.0)};
-        if (drizzle_rows(DRIZZLE_SQUARE, 0.5, &m, &x, &b) || drizzle_splits(DRIZZLE_SQUARE, 0.5, &m, N, N)
+        if (add_rows(DRIZZLE_SQUARE, 0.5, &m, &x, &b) || drizzle_splits(DRIZZLE_SQUARE, 0.5, &m, N, N)
             || !drizzle_splits(DRIZZLE_SQUARE, 0.6, &m, N, N))
             bad++;
     }
@@ -202,15 +232,15 @@ static void bands(void)
             memset(c1, 0, sizeof c1);
             memset(c2, 0, sizeof c2);
             struct drizzle_input in = {.nx = NX, .ny = NY, .pix = pix, .weight = wht, .w = 3, .scale = 0.7, .bit = 4};
-            struct drizzle_band b = {.nx = OX, .ny = OY, .flux = f1, .weight = w1, .context = c1};
-            int st = drizzle_rows((enum drizzle_kernel)kernel, 0.8, &m, &in, &b);
+            struct planes b = {.nx = OX, .ny = OY, .flux = f1, .weight = w1, .context = c1};
+            int st = add_rows((enum drizzle_kernel)kernel, 0.8, &m, &in, &b);
             for (long y = 0; y < OY; y += 7) {
-                struct drizzle_band part = {.nx = OX, .y0 = y, .ny = OY - y < 7 ? OY - y : 7, .flux = f2 + y * OX,
+                struct planes part = {.nx = OX, .y0 = y, .ny = OY - y < 7 ? OY - y : 7, .flux = f2 + y * OX,
                                             .weight = w2 + y * OX, .context = c2 + y * OX};
                 for (long r = 0; r < NY; r += 5) {
                     struct drizzle_input rows = {.nx = NX, .y0 = r, .ny = NY - r < 5 ? NY - r : 5, .pix = pix + r * NX,
                                                  .weight = wht + r * NX, .w = 3, .scale = 0.7, .bit = 4};
-                    st |= drizzle_rows((enum drizzle_kernel)kernel, 0.8, &m, &rows, &part);
+                    st |= add_rows((enum drizzle_kernel)kernel, 0.8, &m, &rows, &part);
                 }
             }
             double total = 0;
@@ -299,9 +329,9 @@ static void bent_drops(void)
     }
     int st = drizzle_map_make(&m, NI, NI, bend_fn, &bent);
     struct drizzle_input in = {.nx = NI, .ny = NI, .pix = pix, .w = 1, .scale = 1};
-    struct drizzle_band band = {.nx = NO, .ny = NO, .flux = flux, .weight = weight};
+    struct planes band = {.nx = NO, .ny = NO, .flux = flux, .weight = weight};
     if (st == OK)
-        st = drizzle_rows(DRIZZLE_SQUARE, 0.9, &m, &in, &band);
+        st = add_rows(DRIZZLE_SQUARE, 0.9, &m, &in, &band);
     check_that(st == OK && m.node_x, "bent map drizzled");
     reference(&m, 0.9, pix, wht, rf, rw);
     struct check c = check_begin("bent map: weights against clipping, and the flux");
@@ -331,8 +361,8 @@ static void hard(void)
     turned.y0 -= 10;
     int st = OK;
     for (int k = 0; k < 3; k++) {
-        struct drizzle_band b = {.nx = 20, .ny = 20, .flux = flux[k], .weight = weight[k]};
-        st |= drizzle_rows(kernel[k], pf[k], &turned, &in, &b);
+        struct planes b = {.nx = 20, .ny = 20, .flux = flux[k], .weight = weight[k]};
+        st |= add_rows(kernel[k], pf[k], &turned, &in, &b);
     }
     check_that(!st && !memcmp(flux[0], flux[1], sizeof flux[0]) && !memcmp(flux[0], flux[2], sizeof flux[0]),
                "pixfrac 0 and 1e-9 are the point kernel");
@@ -341,17 +371,17 @@ static void hard(void)
     double f = 0, w = 0;
     struct drizzle_map tiny = {.x0 = 0, .y0 = 0, .xx = 1e-3, .yy = 1e-3, .scale = 1e-3};
     struct drizzle_map tiny_turned = {.xx = 7e-4, .xy = -7e-4, .yx = 7e-4, .yy = 7e-4, .scale = 1e-3};
-    struct drizzle_band one = {.nx = 1, .ny = 1, .flux = &f, .weight = &w};
-    st = drizzle_rows(DRIZZLE_SQUARE, 1, &tiny, &in, &one) | drizzle_rows(DRIZZLE_SQUARE, 1, &tiny_turned, &in, &one);
+    struct planes one = {.nx = 1, .ny = 1, .flux = &f, .weight = &w};
+    st = add_rows(DRIZZLE_SQUARE, 1, &tiny, &in, &one) | add_rows(DRIZZLE_SQUARE, 1, &tiny_turned, &in, &one);
     check_that(!st && fabs(f - 650) < 1e-9 && fabs(w - 50) < 1e-12, "scale 1e-3: %g in one pixel", f);
     enum { BIG = 1000 };
     double *bf = calloc(2 * (size_t)BIG * BIG, sizeof *bf);
     if (!bf)
         exit(1);
-    struct drizzle_band big = {.nx = BIG, .ny = BIG, .flux = bf, .weight = bf + BIG * BIG};
+    struct planes big = {.nx = BIG, .ny = BIG, .flux = bf, .weight = bf + BIG * BIG};
     struct drizzle_map huge = {.x0 = 499.5 - 2000, .y0 = 499.5 - 2000, .xx = 1000, .yy = 1000, .scale = 1000};
     struct drizzle_map huge_turned = {.x0 = 499.5 - 3 * BIG, .y0 = 499.5, .xx = 1000, .xy = 500, .yx = -500, .yy = 1000, .scale = 1118};
-    st = drizzle_rows(DRIZZLE_SQUARE, 1, &huge, &in, &big);
+    st = add_rows(DRIZZLE_SQUARE, 1, &huge, &in, &big);
     double sum = 0, worst = 0;
     for (int i = 0; i < BIG * BIG; i++) {
         sum += bf[i];
@@ -359,7 +389,7 @@ static void hard(void)
     }
     check_that(!st && fabs(sum - 13) < 1e-9 && worst < 1e-17, "scale 1e3: one pixel spread over 10^6, worst error %.2g of 1.3e-5", worst);
     memset(bf, 0, 2 * sizeof *bf * BIG * BIG);
-    st = drizzle_rows(DRIZZLE_SQUARE, 1, &huge_turned, &in, &big);
+    st = add_rows(DRIZZLE_SQUARE, 1, &huge_turned, &in, &big);
     double least = 1, most = 0;
     for (int i = BIG * BIG; i < 2 * BIG * BIG; i++) {
         least = fmin(least, bf[i]);
@@ -373,14 +403,14 @@ static void hard(void)
     double g[3] = {0}, v[3] = {0};
     struct drizzle_map same = {.xx = 1, .yy = 1, .scale = 1};
     struct drizzle_input masked = {.nx = 3, .ny = 1, .pix = bad, .weight = zero, .w = 1, .scale = 1};
-    struct drizzle_band row = {.nx = 3, .ny = 1, .flux = g, .weight = v};
-    st = drizzle_rows(DRIZZLE_SQUARE, 1, &same, &masked, &row);
+    struct planes row = {.nx = 3, .ny = 1, .flux = g, .weight = v};
+    st = add_rows(DRIZZLE_SQUARE, 1, &same, &masked, &row);
     check_that(!st && v[0] == 0 && v[1] == 0 && v[2] == 0 && g[0] == 0, "NaN pixels and weights <= 0 do not count");
     struct drizzle_map away = {.x0 = 1e8, .y0 = -1e8, .xx = 1, .xy = 0.5, .yx = -0.5, .yy = 1, .scale = 1};
-    st = drizzle_rows(DRIZZLE_SQUARE, 1, &away, &in, &row) | drizzle_rows(DRIZZLE_GAUSSIAN, 1, &away, &in, &row);
+    st = add_rows(DRIZZLE_SQUARE, 1, &away, &in, &row) | add_rows(DRIZZLE_GAUSSIAN, 1, &away, &in, &row);
     check_that(!st && v[0] == 0, "an exposure elsewhere adds nothing");
-    check_that(drizzle_rows(DRIZZLE_SQUARE, -1, &same, &in, &row) == E_RANGE
-               && drizzle_rows(DRIZZLE_SQUARE, NAN, &same, &in, &row) == E_RANGE, "pixfrac outside its range is refused");
+    check_that(add_rows(DRIZZLE_SQUARE, -1, &same, &in, &row) == E_RANGE
+               && add_rows(DRIZZLE_SQUARE, NAN, &same, &in, &row) == E_RANGE, "pixfrac outside its range is refused");
 }
 
 /* Gaussian and Lanczos kernels: sums over a wide grid tend to their integrals. */
@@ -391,15 +421,15 @@ static void smooth(void)
     static double f[41 * 41], w[41 * 41];
     struct drizzle_map m = {.x0 = 20.25, .y0 = 19.875, .xx = 3, .xy = 0, .yx = 0, .yy = 3, .scale = 3};
     struct drizzle_input in = {.nx = 1, .ny = 1, .pix = &d, .w = 1, .scale = 1};
-    struct drizzle_band b = {.nx = 41, .ny = 41, .flux = f, .weight = w};
-    int st = drizzle_rows(DRIZZLE_GAUSSIAN, 2, &m, &in, &b);
+    struct planes b = {.nx = 41, .ny = 41, .flux = f, .weight = w};
+    int st = add_rows(DRIZZLE_GAUSSIAN, 2, &m, &in, &b);
     double s = 6 / 2.3548, sum = 0;
     for (int i = 0; i < 41 * 41; i++)
         sum += w[i];
     check_close(&c, w[20 * 41 + 20], exp(-(0.0625 + 0.015625) / (2 * s * s)) / (2 * M_PI * s * s), 1e-15);
     check_close(&c, sum, pow(erf(2.5 / sqrt(2)), 2), 0.01);
     memset(w, 0, sizeof w);
-    st |= drizzle_rows(DRIZZLE_LANCZOS3, 1, &m, &in, &b);
+    st |= add_rows(DRIZZLE_LANCZOS3, 1, &m, &in, &b);
     double x = M_PI * 0.25 / 3, y = M_PI * 1.125 / 3;
     check_close(&c, w[21 * 41 + 20], sin(x) / x * sin(x / 3) / (x / 3) * sin(y) / y * sin(y / 3) / (y / 3), 1e-14);
     check_end(&c);
@@ -420,8 +450,8 @@ static void noise(void)
         double f[64] = {0}, w[64] = {0};
         struct drizzle_map m = {.x0 = 3 + uni(i, 8), .y0 = 3 + uni(i, 9), .xx = 1.5, .yy = 1.5, .scale = 1.5};
         struct drizzle_input in = {.nx = 1, .ny = 1, .pix = &d, .w = 1, .scale = 1};
-        struct drizzle_band b = {.nx = 8, .ny = 8, .flux = f, .weight = w};
-        if (drizzle_rows(DRIZZLE_SQUARE, 0.8, &m, &in, &b))
+        struct planes b = {.nx = 8, .ny = 8, .flux = f, .weight = w};
+        if (add_rows(DRIZZLE_SQUARE, 0.8, &m, &in, &b))
             one = 0;
         for (int k = 0; k < 64; k++)
             squares += w[k] * w[k] / 4000;
