@@ -293,6 +293,10 @@ static void run(const struct request *r, const struct common *c, const char *rec
         die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
     check(st);
     make_plan(&plan, &v, r, c, &emission);
+    otf_free(&in.otf);                 /* the plan holds its own tables: make room for the image */
+    scene_free(&in.scene);
+    table_free(&in.list);
+    free(x);
     if (!c->check) {
         struct header h = im.hdr;
         check(image_new(&im, v.nx, v.ny));
@@ -304,13 +308,9 @@ static void run(const struct request *r, const struct common *c, const char *rec
     }
     plan_free(&plan);
     emission_free(&emission);
-    free(x);
     image_free(&im);
-    otf_free(&in.otf);
-    scene_free(&in.scene);
     models_free(&in.models);
     table_free(&in.catalogue);
-    table_free(&in.list);
 }
 
 int main(int argc, char **argv)

@@ -1,5 +1,6 @@
 /* reach.c - how far objects reach in space and frequency. */
 #include "reach.h"
+#include "fft.h"
 #include "shapelet.h"
 #include <math.h>
 #include <stdlib.h>
@@ -101,7 +102,7 @@ static void profile(const struct wings *m, int n, int every, const double *image
     for (int j = 0; j < n; j++)
         for (int i = 0; i < n; i++) {
             double value = image[(size_t)j * (size_t)n + (size_t)i];
-            int k = (int)((hypot(i - n / 2, j - n / 2) + 0.5) * every);
+            const int dx = abs(i - n / 2), dy = abs(j - n / 2), k = (int)(((dx > dy ? dx : dy) + 0.5) * every);
             if (k >= m->n) {
                 rest += value;
                 continue;
@@ -152,11 +153,11 @@ static int broad_levels(struct wings *m, struct stamp_grid *g, struct stamp_work
         coarse.pixel = g->pixel * every[l];
         int st = smooth(g, sigma[l] * sigma[l] - sigma[l - 1] * sigma[l - 1]);
         if (st == OK)
-            st = fft_plan_c2r(&coarse.fft, coarse.n, coarse.n);
+            st = lanes_new(&coarse.fft, coarse.n);
         if (st)
             return st;
         st = stamp_fourier(&coarse, work, &star, coarse.n / 2, coarse.n / 2, 1, 1.1 / (sigma[l] * g->du), image);
-        fft_done(coarse.fft);
+        lanes_free(coarse.fft);
         if (st)
             return st;
         m->sigma[l] = sigma[l];

@@ -187,7 +187,7 @@ static int run(const struct plan *p, size_t n, const struct entry *e, struct win
             return st;
         begin += m;
     }
-    for (int strip = 0; strip < STRIPS; strip++)
+    for (int strip = 0; w->row && strip < STRIPS; strip++)
         window_move(w, strip, w->im->ny);
     return OK;
 }
@@ -204,50 +204,71 @@ static int workers_new(struct worker *w, int threads, size_t scratch)
     return st;
 }
 
-/* Entries in drawing order, rows of the window and largest area. */
-static size_t order(const struct plan *p, struct entry *e, int *tallest, size_t *largest)
+/* What the entries of one pass need. */
+struct pass {
+    size_t n;
+    int tallest;           /* rows of the window; 0: none */
+    size_t largest;        /* doubles of the largest stamp */
+};
+
+/* Entries in drawing order: pass 0 of tall stamps, pass 1 of the others. */
+static void order(const struct plan *p, struct entry *e, struct pass pass[2])
 {
     size_t n = 0;
     for (size_t i = 0; i < p->n; i++) {
         const struct draw *d = &p->draw[i];
         if (d->path == PATH_NONE)
             continue;
-        int tall = d->ny > TALL;
+        const int tall = d->ny > TALL;
+        const size_t area = (size_t)d->nx * (size_t)d->ny;
+        struct pass *q = &pass[!tall];
         e[n++] = (struct entry){tall ? -1 : d->y0 < 0 ? 0 : d->y0, (unsigned int)i};
-        *tallest = !tall && d->ny > *tallest ? d->ny : *tallest;
-        if ((size_t)d->nx * (size_t)d->ny > *largest)
-            *largest = (size_t)d->nx * (size_t)d->ny;
+        q->n++;
+        q->tallest = !tall && d->ny > q->tallest ? d->ny : q->tallest;
+        q->largest = area > q->largest ? area : q->largest;
     }
     qsort(e, n, sizeof *e, by_row);
-    return n;
+}
+
+/* One pass has its own memory: that of tall stamps is given back before the window is made. */
+static int render_pass(const struct plan *p, const struct pass *q, const struct entry *e, struct image *im, int threads,
+                       struct progress *bar)
+{
+    if (q->n == 0)
+        return OK;
+    struct window w = {.im = im, .height = q->tallest > im->ny ? (int)im->ny : q->tallest};
+    struct worker *workers = calloc((size_t)threads, sizeof *workers);
+    double **stamp = malloc((BATCH_PIXELS / 16 + 1) * sizeof *stamp);
+    double *space = fft_alloc(((q->largest > BATCH_PIXELS ? q->largest : BATCH_PIXELS) + 8) * sizeof *space);
+    if (q->tallest)
+        w.row = calloc((size_t)w.height * (size_t)im->nx, sizeof *w.row);
+    struct job job = {.p = p, .stamp = stamp, .worker = workers, .bar = bar};
+    int st = workers && stamp && space && (w.row || !q->tallest) ? workers_new(workers, threads, plan_scratch(p)) : E_NOMEM;
+    if (st == OK)
+        st = run(p, q->n, e, &w, &job, space, threads);
+    for (int t = 0; workers && t < threads; t++) {
+        stamp_work_free(workers[t].work);
+        free(workers[t].scratch);
+    }
+    free(workers);
+    free(stamp);
+    free(w.row);
+    fft_free(space);
+    return st;
 }
 
 int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar)
 {
     if (im->nx != p->view.nx || im->ny != p->view.ny || threads < 1 || threads > 256 || p->n > UINT_MAX)
         return E_RANGE;
-    int tallest = 1;
-    size_t largest = BATCH_PIXELS;
+    struct pass pass[2] = {{0}};
     struct entry *e = malloc((p->n + 1) * sizeof *e);
-    struct worker *workers = calloc((size_t)threads, sizeof *workers);
-    double **stamp = malloc((BATCH_PIXELS / 16 + 1) * sizeof *stamp);
-    size_t n = e ? order(p, e, &tallest, &largest) : 0;
-    struct window w = {.im = im, .height = tallest > im->ny ? (int)im->ny : tallest};
-    w.row = calloc((size_t)w.height * (size_t)im->nx, sizeof *w.row);
-    double *space = fft_alloc((largest + 8) * sizeof *space);
-    struct job job = {.p = p, .stamp = stamp, .worker = workers, .bar = bar};
-
-    int st = e && workers && stamp && w.row && space ? workers_new(workers, threads, plan_scratch(p)) : E_NOMEM;
+    if (!e)
+        return E_NOMEM;
+    order(p, e, pass);
+    int st = render_pass(p, &pass[0], e, im, threads, bar);
     if (st == OK)
-        st = run(p, n, e, &w, &job, space, threads);
-    for (int t = 0; workers && t < threads; t++) {
-        stamp_work_free(workers[t].work);
-        free(workers[t].scratch);
-    }
+        st = render_pass(p, &pass[1], e + pass[0].n, im, threads, bar);
     free(e);
-    free(workers);
-    free(stamp);
-    free(w.row);
-    fft_free(space);
     return st;
 }

@@ -24,7 +24,7 @@ typedef double v8 __attribute__((vector_size(64), aligned(8)));
 struct stamp_work {
     double *mem;           /* arena of `cap` doubles */
     size_t cap, used;
-    double *freq;          /* n x (n/2+1) complex */
+    double *freq;          /* two planes of n x round8(n/2+1), and scratch of the transform */
     size_t freq_cap;
 };
 
@@ -39,7 +39,7 @@ void stamp_work_free(struct stamp_work *w)
     if (!w)
         return;
     free(w->mem);
-    fft_free(w->freq);
+    free(w->freq);
     free(w);
 }
 
@@ -75,10 +75,10 @@ static int freq_need(struct stamp_work *w, size_t doubles)
 {
     if (doubles <= w->freq_cap)
         return OK;
-    double *p = fft_alloc(doubles * sizeof *p);
+    double *p = aligned_alloc(64, round8(doubles) * sizeof *p);
     if (!p)
         return E_NOMEM;
-    fft_free(w->freq);
+    free(w->freq);
     w->freq = p;
     w->freq_cap = doubles;
     return OK;
@@ -176,7 +176,7 @@ int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp
     if (st == OK)
         st = tabulate(&s, t, r, tmp + 2 * rows * cols, tmp, tmp + rows * cols, tmp + 2 * rows * cols + rows);
     if (st == OK)
-        st = fft_plan_c2r(&s.fft, n, n);
+        st = lanes_new(&s.fft, n);
     free(tmp);
     if (st) {
         free(s.t_re);
@@ -191,8 +191,7 @@ void stamp_grid_free(struct stamp_grid *g)
 {
     free(g->t_re);
     free(g->t_im);
-    if (g->fft)
-        fft_done(g->fft);
+    lanes_free(g->fft);
     *g = (struct stamp_grid){0};
 }
 
@@ -354,13 +353,24 @@ WIDE static void row_fold(int n, int m, const double *re, const double *im, doub
     }
 }
 
-/* out (complex) += (a + i b) (c + i d), columns 0..h. */
-WIDE static void row_add(int h, const double *a, const double *b, double c, double d, double *out)
+/* re + i im += (a + i b) (c + i d), columns 0..h. */
+WIDE static void row_add(int h, const double *a, const double *b, double c, double d, double *re, double *im)
 {
     for (int j = 0; j <= h; j++) {
-        out[2 * j] += a[j] * c - b[j] * d;
-        out[2 * j + 1] += a[j] * d + b[j] * c;
+        re[j] += a[j] * c - b[j] * d;
+        im[j] += a[j] * d + b[j] * c;
     }
+}
+
+/* to = (a + i b) (c + i d) in columns 0..m-1, 0 from there to the next multiple of 8 beyond `last`. */
+WIDE static void row_store(int m, int last, const double *a, const double *b, double c, double d, double *re, double *im)
+{
+    for (int j = 0; j < m; j++) {
+        re[j] = a[j] * c - b[j] * d;
+        im[j] = a[j] * d + b[j] * c;
+    }
+    for (int j = m; j < last; j++)
+        re[j] = im[j] = 0;
 }
 
 /* U of A' = R U (R a rotation by rho), A' = {a, b, c, d} = rows. */
@@ -444,13 +454,50 @@ static int transform_row(const struct transform *t, int ky, int m, const struct 
     return st ? st : row_mapped(t, -ky, m, r->m_re, r->m_im);
 }
 
-/* All rows: transform, transfer function, phases, aliases; into freq. */
-static int fold_rows(const struct transform *t, double kcut, double scale, const struct row *r, double *freq)
+/* The half plane of frequencies: two planes, rows of ld. */
+struct plane {
+    double *re, *im;
+    size_t ld;
+    int columns;           /* 0..columns-1 hold something */
+};
+
+/* Rows +-ky, all bands beyond the grid's own frequencies added onto it. */
+static void add_folded(const struct transform *t, int ky, int m, double c, double d, const struct row *r, const struct plane *f)
+{
+    const int n = t->g->n, h = n / 2, row = ky % n, mirror = (n - row) % n;
+    for (int i = 0; i < 4; i++)
+        memset(t->acc[i], 0, ((size_t)h + 1) * sizeof(double));
+    row_fold(n, m, r->p_re, r->p_im, t->acc[0], t->acc[1], t->acc[2], t->acc[3]);
+    row_fold(n, m, r->m_re, r->m_im, t->acc[2], t->acc[3], t->acc[0], t->acc[1]);
+    row_add(h, t->acc[0], t->acc[1], c, d, f->re + (size_t)row * f->ld, f->im + (size_t)row * f->ld);
+    if (ky > 0)
+        row_add(h, t->acc[2], t->acc[3], c, -d, f->re + (size_t)mirror * f->ld, f->im + (size_t)mirror * f->ld);
+}
+
+/* Rows +-ky when there is only the one band. */
+static void put_row(const struct transform *t, int ky, int m, double c, double d, const struct row *r, const struct plane *f)
+{
+    const size_t up = (size_t)ky * f->ld, down = (size_t)(t->g->n - ky) * f->ld;
+    row_store(m, f->columns, r->p_re, r->p_im, c, d, f->re + up, f->im + up);
+    if (ky > 0)
+        row_store(m, f->columns, r->m_re, r->m_im, c, -d, f->re + down, f->im + down);
+}
+
+/* Zero what rows of one band leave out, or everything. */
+static void clear(const struct plane *f, int n, int single, int top)
+{
+    for (int row = single ? top + 1 : 0; row < (single ? n - top : n); row++) {
+        memset(f->re + (size_t)row * f->ld, 0, (size_t)f->columns * sizeof(double));
+        memset(f->im + (size_t)row * f->ld, 0, (size_t)f->columns * sizeof(double));
+    }
+}
+
+/* All rows: transform, transfer function, phases, aliases; into f. */
+static int fold_rows(const struct transform *t, double kcut, double scale, const struct row *r, const struct plane *f)
 {
     const struct stamp_grid *g = t->g;
-    const int n = g->n, h = n / 2;
-    const size_t bytes = ((size_t)h + 1) * sizeof(double);
-    const int top = kcut < g->kmax ? (int)kcut : g->kmax;
+    const int top = kcut < g->kmax ? (int)kcut : g->kmax, single = top < g->n / 2;
+    clear(f, g->n, single, top);
     for (int ky = 0; ky <= top; ky++) {
         double reach = sqrt(kcut * kcut - (double)ky * ky);
         int m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
@@ -460,15 +507,7 @@ static int fold_rows(const struct transform *t, double kcut, double scale, const
         size_t up = (size_t)(g->kmax + ky) * (size_t)g->ld, down = (size_t)(g->kmax - ky) * (size_t)g->ld;
         row_transfer(m, g->t_re + up, g->t_im ? g->t_im + up : NULL, t->p_re, t->p_im, r->p_re, r->p_im);
         row_transfer(m, g->t_re + down, g->t_im ? g->t_im + down : NULL, t->p_re, t->p_im, r->m_re, r->m_im);
-        for (int i = 0; i < 4; i++)
-            memset(t->acc[i], 0, bytes);
-        row_fold(n, m, r->p_re, r->p_im, t->acc[0], t->acc[1], t->acc[2], t->acc[3]);
-        row_fold(n, m, r->m_re, r->m_im, t->acc[2], t->acc[3], t->acc[0], t->acc[1]);
-        size_t row = (size_t)(ky % n);
-        double c = scale * t->y_re[ky], d = scale * t->y_im[ky];
-        row_add(h, t->acc[0], t->acc[1], c, d, freq + row * 2 * ((size_t)h + 1));
-        if (ky > 0)
-            row_add(h, t->acc[2], t->acc[3], c, -d, freq + (((size_t)n - row) % (size_t)n) * 2 * ((size_t)h + 1));
+        (single ? put_row : add_folded)(t, ky, m, scale * t->y_re[ky], scale * t->y_im[ky], r, f);
     }
     return OK;
 }
@@ -480,25 +519,24 @@ int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct
         (s->coef && (s->nmax < 0 || s->nmax > SHAPELET_NMAX || !(s->beta_x > 0) || !(s->beta_y > 0))))
         return E_RANGE;
     const int columns = 1 + (kcut < g->kmax ? (int)kcut : g->kmax);
-    const size_t nfreq = (size_t)g->n * 2 * ((size_t)g->n / 2 + 1);
-    const size_t ld = round8((size_t)columns);
+    const size_t ld = round8((size_t)columns), width = round8((size_t)g->n / 2 + 1), nfreq = (size_t)g->n * width;
     struct transform t = {0};
-    int st = freq_need(w, nfreq + 4 * ld);
+    int st = freq_need(w, 2 * nfreq + round8(lanes_scratch(g->fft)) + 4 * ld);
     if (st == OK)
         st = transform_start(&t, w, g, s, columns);
     if (st)
         return st;
     phases(t.ld, x, g->n, t.p_re, t.p_im);
     phases(t.ld, y, g->n, t.y_re, t.y_im);
-    double *rows = w->freq + nfreq;
+    double *scratch = w->freq + 2 * nfreq, *rows = scratch + round8(lanes_scratch(g->fft));
     const struct row r = {rows, rows + ld, rows + 2 * ld, rows + 3 * ld};
-    memset(w->freq, 0, nfreq * sizeof *w->freq);
+    const struct plane f = {w->freq, w->freq + nfreq, width, columns < g->n / 2 + 1 ? columns : g->n / 2 + 1};
     double scale = flux / ((double)g->n * g->n);
     if (s->coef)
         scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
-    st = fold_rows(&t, kcut, scale, &r, w->freq);
+    st = fold_rows(&t, kcut, scale, &r, &f);
     if (st == OK)
-        fft_run(g->fft, w->freq, out);
+        lanes_run(g->fft, f.columns, f.re, f.im, (int)width, scratch, out);
     return st;
 }
 

@@ -20,7 +20,7 @@
 #define PIXSHEAR_STAMP_H
 
 #include "err.h"
-#include "fft.h"
+#include "lanes.h"
 #include "otf.h"
 #include <stddef.h>
 
@@ -47,7 +47,7 @@ struct stamp_grid {
     double du;             /* cycles/arcsec */
     double pixel;          /* arcsec */
     double *t_re, *t_im;   /* (2 kmax + 1) x ld: rows u_y = -kmax du .., columns u_x >= 0; t_im NULL: real */
-    struct fft *fft;
+    struct lanes *fft;
 };
 
 /* Factors of the transfer function beyond the PSF, arcsec; 0 leaves the factor out. */
@@ -74,7 +74,7 @@ void stamp_work_free(struct stamp_work *w);
 /*
  * Object with its origin at (x, y) in pixels of the stamp (centre of the first
  * pixel is 0); flux in electrons; frequencies |u| <= kcut du are used.
- * out: n x n from fft_alloc, overwritten.
+ * out: n x n, overwritten.
  */
 MUST_CHECK int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s,
                              double x, double y, double flux, double kcut, double *out);

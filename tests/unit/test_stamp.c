@@ -4,6 +4,7 @@
  * and the Fourier integral written out as a sum over frequencies.
  */
 #include "check.h"
+#include "fft.h"
 #include "image.h"
 #include "imageio.h"
 #include "otf.h"

