@@ -182,5 +182,6 @@ int main(int argc, char **argv)
     free(bits);
     free(where);
     table_free(&t);
+    opt_free(own);
     return EXIT_DONE;
 }

@@ -442,10 +442,9 @@ int main(int argc, char **argv)
     if (!c.check)
         search(&f, &prog, own, &o, &c, &p, inputs, n_inputs);
     free(diameter);
-    free(o.apertures.v);
-    free(o.checks.v);
     free(f.map);
     sky_close(f.sky);
     image_free(&f.im);
+    opt_free(own);
     return EXIT_DONE;
 }

@@ -787,5 +787,6 @@ int main(int argc, char **argv)
     if (r->weights.n && r->weights.n != (size_t)c.argc)
         die(EXIT_USAGE, "--weight was given %zu times for %d operands", r->weights.n, c.argc);
     run(&w, &prog, own);
+    opt_free(own);
     return EXIT_DONE;
 }

@@ -201,6 +201,6 @@ int main(int argc, char **argv)
             die(EXIT_RUN, "%s", e.text);
     }
     fits_in_close(v.f);
-    free(crop.v);
+    opt_free(own);
     return EXIT_DONE;
 }

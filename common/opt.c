@@ -179,7 +179,22 @@ static void take_reals(const struct opt *o, const char *text)
     if (!v)
         die(EXIT_RUN, "option --%s: %s", o->name, err_text(E_NOMEM));
     r->n = list(o, text, v, max);
+    free(r->v);
     r->v = v;
+}
+
+void opt_free(const struct opt *own)
+{
+    for (const struct opt *o = own; o->name; o++)
+        if (o->type == OPT_REALS) {
+            struct opt_reals *r = o->value;
+            free(r->v);
+            *r = (struct opt_reals){0};
+        } else if (o->type == OPT_STRS) {
+            struct opt_strs *s = o->value;
+            free(s->v);
+            *s = (struct opt_strs){0};
+        }
 }
 
 static void take_long(const struct opt *o, const char *text)

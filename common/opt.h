@@ -21,7 +21,7 @@ enum opt_type {
 
 struct opt_reals {
     size_t n;
-    double *v;             /* owned by the process, freed at exit */
+    double *v;             /* freed by opt_free */
 };
 
 struct opt_strs {
@@ -83,6 +83,9 @@ int opt_given(const struct opt *own, const struct common *c, const char *name);
  * --max-memory, file names reduced to base names, shell-quoted.  Allocated.
  */
 char *opt_record(const struct program *prog, const struct opt *own, const struct common *c);
+
+/* Frees the lists that opt_parse made for OPT_REALS and OPT_STRS, and empties them. */
+void opt_free(const struct opt *own);
 
 /* A whole argument as a number; 0 on success.  No trailing characters, no nan, no inf. */
 int opt_number(const char *text, double *value);

@@ -221,7 +221,7 @@ static int psfex_header(const char *name, const struct header *h, struct psfex *
     if (!bad && m->axes > 0)
         bad = header_long(h, "POLNGRP", &groups) || header_long(h, "POLDEG1", &m->degree);
     for (long i = 0; !bad && i < m->axes && i < 2; i++) {
-        char key[16];
+        char key[32];
         snprintf(key, sizeof key, "POLZERO%ld", i + 1);
         bad |= header_double(h, key, &m->zero[i]) != OK;
         snprintf(key, sizeof key, "POLSCAL%ld", i + 1);

@@ -42,6 +42,10 @@ static void noise(char **name, double limit)
         bb += y * y;
         ab += x * y;
     }
+    image_free(&t1);
+    image_free(&n1);
+    image_free(&t2);
+    image_free(&n2);
     printf("%.6f %.0f\n", (ab - a * b / m) / sqrt((aa - a * a / m) * (bb - b * b / m)), m);
 }
 
@@ -59,6 +63,8 @@ static void diff(char **name)
             worst = d;
         peak = fmax(peak, fabs((double)a.pix[i]));
     }
+    image_free(&a);
+    image_free(&b);
     printf("%.6g %ld\n", worst / peak, other);
 }
 
@@ -68,6 +74,7 @@ static void sum(const char *name)
     double s = 0;
     for (size_t i = 0; i < image_count(&a); i++)
         s += (double)a.pix[i];
+    image_free(&a);
     printf("%.15g\n", s);
 }
 
