@@ -20,12 +20,14 @@ SHELL       = bash
 LIBS     = cfitsio wcslib gsl fftw3 zlib
 # asked once, when first needed: `make deps all` may have to install pkg-config first
 PKG_C    = $(eval PKG_C := $$(shell pkg-config --cflags $(LIBS) 2>/dev/null))$(PKG_C)
-PKG_L    = $(eval PKG_L := $$(shell pkg-config --libs $(LIBS) 2>/dev/null))$(PKG_L)
+PKG_L    = $(eval PKG_L := $$(shell pkg-config --libs $(filter-out cfitsio,$(LIBS)) 2>/dev/null))$(PKG_L)
+# cfitsio brings 35 libraries: it is loaded by name, when a tile-compressed image is read
+SONAME   = $(eval SONAME := $$(or $$(shell readelf -d "$$$$(pkg-config --variable=libdir cfitsio 2>/dev/null)/libcfitsio.so" 2>/dev/null | sed -n 's/.*(SONAME).*\[\(.*\)\].*/\1/p'),libcfitsio.so))$(SONAME)
 
 # Same bits from every compiler and processor: no contraction, no fast-math.
-ALL_C    = -std=c11 -D_GNU_SOURCE -DPIXSHEAR_VERSION='"$(VERSION)"' -Icommon $(PKG_C) \
+ALL_C    = -std=c11 -D_GNU_SOURCE -DPIXSHEAR_VERSION='"$(VERSION)"' -DCFITSIO_LIBRARY='"$(SONAME)"' -Icommon $(PKG_C) \
            $(CFLAGS) -ffp-contract=off -fno-math-errno -pthread $(WARN) $(WERROR) $(SAN)
-ALL_L    = $(LDFLAGS) $(SAN) $(PKG_L) -lm -pthread
+ALL_L    = $(LDFLAGS) $(SAN) $(PKG_L) -lm -ldl -pthread
 
 PROGRAMS := $(patsubst cmd/%.c,%,$(wildcard cmd/*.c))
 COMMON   := $(patsubst common/%.c,$(BUILD)/common/%.o,$(wildcard common/*.c))
@@ -54,7 +56,7 @@ $(BUILD)/%.o: %.c $(BUILD)/flags | layers
 # Rebuild everything when the flags change.
 $(BUILD)/flags: FORCE
 	@mkdir -p $(@D)
-	@[ -n "$(PKG_L)" ] || { echo "libraries are missing: run 'make deps' first (cfitsio wcslib gsl fftw3 zlib by pkg-config)" >&2; exit 1; }
+	@pkg-config $(LIBS) 2>/dev/null || { echo "libraries are missing: run 'make deps' first (cfitsio wcslib gsl fftw3 zlib by pkg-config)" >&2; exit 1; }
 	@echo '$(subst ','\'',$(CC) $(ALL_C) $(ALL_L))' | cmp -s - $@ || echo '$(subst ','\'',$(CC) $(ALL_C) $(ALL_L))' > $@
 FORCE:
 .SECONDARY:
@@ -64,7 +66,7 @@ endif
 
 -include $(wildcard $(BUILD)/common/*.d $(BUILD)/cmd/*.d $(BUILD)/tests/unit/*.d)
 
-layers:    # check that common/ has an order and that only imageio knows cfitsio
+layers:    # check that common/ has an order and that only unpack knows cfitsio
 	@tests/layers
 
 $(BUILD)/tool/%: $(BUILD)/tests/tool/%.o $(BUILD)/libcommon.a

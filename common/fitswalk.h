@@ -55,6 +55,8 @@ struct fits_in {
     struct fits_unit *unit;
     struct hdu *hdu;           /* what imageio.h shows of each unit */
     int n;
+    struct unpack **unpack;    /* decoder of each tile-compressed HDU, NULL until its pixels are read */
+    double max_memory;
     int chosen;                /* HDU of the name's suffix, -1 without a suffix */
 };
 

@@ -11,6 +11,7 @@
 #include "fitswalk.h"
 #include "simd.h"
 #include "source.h"
+#include "unpack.h"
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -34,6 +35,24 @@ static struct hdu describe(const struct fits_unit *u, int index)
         h.is_image = !u->more_axes && h.nx > 0 && h.ny > 0 && h.nz > 0;
     }
     return h;
+}
+
+/* A tile-compressed image looks like the image that it was. */
+static int describe_packed(struct fits_in *f, int index, struct err *e)
+{
+    const struct fits_unit *u = &f->unit[index];
+    struct hdu *h = &f->hdu[index];
+    struct unpack_shape s;
+    const char *why;
+    int st = unpack_shape(&s, u, &why);
+    if (st)
+        return err_set(e, st, "%s: HDU %d: tile-compressed image: %s", source_name(f->src), index, why);
+    h->bitpix = s.bitpix;
+    h->nx = s.axis[0];
+    h->ny = s.axis[1];
+    h->nz = s.axis[2];
+    h->is_image = s.naxis >= 2 && !s.more_axes;
+    return OK;
 }
 
 /* Index of "n", "NAME" or "NAME,ver", -1 when there is none. */
@@ -67,11 +86,18 @@ static int open_parts(struct fits_in *f, const char *path, const char *suffix, d
         st = fits_walk(f->src, &f->unit, &f->n, e);
     if (st)
         return st;
+    f->max_memory = max_memory;
     f->hdu = calloc((size_t)f->n, sizeof *f->hdu);
-    if (!f->hdu)
+    f->unpack = calloc((size_t)f->n, sizeof *f->unpack);
+    if (!f->hdu || !f->unpack)
         return err_set(e, E_NOMEM, "%s: out of memory", path);
-    for (int i = 0; i < f->n; i++)
+    for (int i = 0; i < f->n && !st; i++) {
         f->hdu[i] = describe(&f->unit[i], i);
+        if (f->unit[i].compressed)
+            st = describe_packed(f, i, e);
+    }
+    if (st)
+        return st;
     f->chosen = suffix ? by_suffix(f, suffix) : -1;
     if (suffix && f->chosen < 0)
         return err_set(e, E_MISSING, "%s: has no HDU [%s] (there are %d)", path, suffix, f->n);
@@ -100,6 +126,9 @@ void fits_in_close(struct fits_in *f)
 {
     if (!f)
         return;
+    for (int i = 0; f->unpack && i < f->n; i++)
+        unpack_close(f->unpack[i]);
+    free(f->unpack);
     fits_walk_free(f->unit, f->n);
     source_close(f->src);
     free(f->hdu);
@@ -121,7 +150,7 @@ int fits_in_selected(const struct fits_in *f)
     if (f->chosen >= 0)
         return f->chosen;
     for (int i = 0; i < f->n; i++)
-        if (f->hdu[i].is_image || f->unit[i].compressed)
+        if (f->hdu[i].is_image)
             return i;
     return -1;
 }
@@ -141,7 +170,8 @@ int fits_in_header(struct fits_in *f, int index, struct header *h, struct err *e
         return err_set(e, E_RANGE, "%s: has no HDU %d", source_name(f->src), index);
     const struct fits_unit *u = &f->unit[index];
     for (size_t i = 0; i < u->cards.n; i++) {
-        if (fits_structural(u->cards.card[i], u))
+        if (fits_structural(u->cards.card[i], u) ||
+            (u->compressed && !strncmp(u->cards.card[i], "EXTNAME = 'COMPRESSED_IMAGE'", 28)))
             continue;
         int st = header_append(h, u->cards.card[i]);
         if (st)
@@ -297,7 +327,7 @@ static int not_an_image(const struct fits_in *f, int index, struct err *e)
         return err_set(e, E_MISSING, "%s: has no image", name);
     const struct fits_unit *u = &f->unit[index];
     if (u->compressed)
-        why = "is a tile-compressed image: run funpack first";
+        why = "is a tile-compressed image of one axis, or of more than three";
     else if (u->kind == UNIT_BINTABLE || u->kind == UNIT_ASCII)
         why = "is a table, not an image";
     else if (u->kind != UNIT_IMAGE)
@@ -311,6 +341,27 @@ static int not_an_image(const struct fits_in *f, int index, struct err *e)
     return err_set(e, E_DATA, "%s: HDU %d %s", name, index, why);
 }
 
+/* The same of a tile-compressed image, whose values come scaled. */
+static int read_packed(struct fits_in *f, int index, long z, long y0, long nrow, float *out, double *out2,
+                       struct err *e)
+{
+    struct unpack **u = &f->unpack[index];
+    const size_t nx = (size_t)f->hdu[index].nx;
+    int st = *u ? OK : unpack_open(u, f->src, &f->unit[index], index, f->max_memory, e);
+    for (long done = 0, got; done < nrow && !st; done += got) {
+        const double *pix;
+        st = unpack_rows(*u, z, y0 + done, nrow - done, &pix, &got, e);
+        if (st)
+            break;
+        const size_t at = (size_t)done * nx, n = (size_t)got * nx;
+        if (out2)
+            memcpy(out2 + at, pix, n * sizeof *pix);
+        for (size_t i = 0; out && i < n; i++)
+            out[at + i] = (float)pix[i];
+    }
+    return st;
+}
+
 /* Rows as float (out) or double (out2), whichever is not NULL. */
 static int read_rows(struct fits_in *f, int index, long z, long y0, long nrow, float *out, double *out2,
                      struct err *e)
@@ -321,6 +372,8 @@ static int read_rows(struct fits_in *f, int index, long z, long y0, long nrow, f
     const struct fits_unit *u = &f->unit[index];
     if (z < 0 || z >= h->nz || y0 < 0 || nrow < 0 || nrow > h->ny - y0)
         return err_set(e, E_RANGE, "%s: HDU %d: rows out of range", source_name(f->src), index);
+    if (u->compressed)
+        return read_packed(f, index, z, y0, nrow, out, out2, e);
 
     size_t bytes = (size_t)abs(u->bitpix) / 8, n = (size_t)nrow * (size_t)h->nx;
     size_t row = (size_t)z * (size_t)h->ny + (size_t)y0;

@@ -1,8 +1,9 @@
 /*
  * imageio.h - FITS images and tables, in and out, by our own reader
- * (imageio.c, fitswalk.c, fitstable.c) and writer (fitsout.c).  Only imageio.c
- * may include fitsio.h; it will need it for tile-compressed images, which are
- * refused.
+ * (imageio.c, fitswalk.c, fitstable.c) and writer (fitsout.c).  cfitsio is
+ * needed for tile-compressed images only, which a child process decodes
+ * (unpack.c, which alone may include fitsio.h).  Such an image has the index of
+ * its binary table and the header, size and pixels of what was compressed.
  *
  * Names are literal.  When no file has the literal name, one suffix is
  * understood: [n] (0 = primary), [EXTNAME] or [EXTNAME,ver]; "-" is standard
