@@ -1,17 +1,23 @@
-# Usable galaxies per square arcminute against the pixel scale of the image.
+# Detected galaxies, those left after each cut, and the usable ones (thick).
 load "style.gp"
-f = dir."/fom-exact.cat"
-rows(s, c) = sprintf("< ./pick %s %s CCDSCALE %s", f, s, c)
-step(s) = s eq "sim1d" || s eq "sim2d" ? 0.5 : 1
-name(s) = s eq "sim1" ? "Sim 1" : s eq "sim1d" ? "Sim 1 drizzled" : s eq "sim2" ? "Sim 2" : "Sim 2 drizzled"
-sets = "sim1 sim1d sim2 sim2d"
-set xlabel "pixel scale of the image {/Symbol q}_s / arcsec"
-set ylabel "usable galaxies n_{gal} / arcmin^{-2}"
+set xlabel theta_s
+set ylabel "galaxies / arcmin^{-2}"
 set yrange [0:*]
 set xrange [0.02:*]
-set offsets 0.01, 0.01, 0, 0
+set key font ",9"
+cuts = "N_DET N_ELLCUT N_SIZECUT"
+left(c) = c eq "N_DET" ? "detected" : c eq "N_ELLCUT" ? "|e| < 1" : "large enough"
 do for [t in "svg pdf png"] {
-    eval(t eq "svg" ? svg("ngal") : t eq "pdf" ? pdf("ngal") : png("ngal"))
-    plot for [i=1:4] s=word(sets, i) rows(s, "N_GAL N_GALERR") using ($1*step(s)):2:3 with yerrorlines ls i title name(s)
+    eval(out(t, "ngal"))
+    set multiplot layout 1,2
+    do for [g=1:2] {
+        set title g == 1 ? "Sim 1" : "Sim 2"
+        set key top right
+        plot for [i=1:2] for [j=1:3] s=word(sets, 2*g-2+i) fom("exact", s, word(cuts, j)) using ($1*step(s)):2 with lines lc rgb (i == 1 ? "#0072b2" : "#d55e00") dt j+1 lw 1 \
+                title i == 1 ? left(word(cuts, j)) : "", \
+            for [i=1:2] s=word(sets, 2*g-2+i) fom("exact", s, "N_GAL N_GALERR") using ($1*step(s)):2:3 with yerrorlines lc rgb (i == 1 ? "#0072b2" : "#d55e00") pt (i == 1 ? 7 : 5) ps .6 lw 1.8 \
+                title i == 1 ? "usable, single" : "usable, drizzled"
+    }
+    unset multiplot
 }
 set output

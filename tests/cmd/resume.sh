@@ -1,0 +1,38 @@
+# The experiment, tiny: killed with SIGKILL at any moment and started again, it
+# ends with the same bytes as a run that nobody disturbed.
+command -v make >/dev/null && command -v gnuplot >/dev/null || { skip "make or gnuplot is missing: interrupted runs not tested"; return 0 2>/dev/null || exit 0; }
+mkdir -p here/examples
+cp -r "$TOP/examples/pixelscale" here/examples/
+ln -s "$BIN" here/bin
+cd here/examples/pixelscale || exit 1
+rm -rf quick* paper* tiny*
+# the catalogues of two fields under three shears, and the pictures' numbers
+catalogues() { (cd "$1" && find . -maxdepth 1 \( -name '*.use' -o -name '*.cat' -o -name '*.rrg' -o -name '*.scene' -o -name '*.models' -o -name 'table.txt' -o -name 'psf*.fits' \) | sort | xargs sha256sum); }
+make -s tiny FIGURES= PICTURES= >log 2>&1 || fail "the tiny experiment fails: $(tail -3 log)"
+catalogues tiny >whole
+between "catalogues of an undisturbed run" "$(grep -c use whole)" 24 24
+rm -rf tiny
+kills=0
+for wait in 0.15 0.4 0.7 0.3 1.0 0.5; do
+    setsid make -s -j2 tiny FIGURES= PICTURES= >log 2>&1 &
+    leader=$!
+    sleep $wait
+    kill -9 -- -$leader 2>/dev/null && kills=$((kills + 1))
+    wait $leader 2>/dev/null
+done
+between "runs killed" $kills 3 6
+make -s -j2 tiny FIGURES= PICTURES= >log 2>&1 || fail "the resumed run fails: $(tail -3 log)"
+catalogues tiny >resumed
+same "six times killed and resumed: the same bytes" whole resumed
+ok "no temporary file is left" test -z "$(find tiny -name '.*.tmp' -o -path 'tiny/work/*')"
+
+# an image that is asked for again is made again, the catalogues stay
+rm tiny/sim1-0.10-1a.plain.use
+make -s tiny FIGURES= PICTURES= KEEP=1 >log 2>&1
+catalogues tiny >again
+same "a lost catalogue is made again, the same bytes" whole again
+ok "KEEP=1 keeps image and segmentation" test -s tiny/work/sim1-0.10-1a.fits -a -s tiny/work/sim1-0.10-1a.seg.fits
+# a step that fails names itself and leaves nothing
+rm tiny/sim1-0.10-1a.plain.use
+make -s tiny FIGURES= PICTURES= SNR=nonsense >log 2>&1 && fail "a failing step must fail the run" || pass "a failing step fails the run"
+ok "and names itself" grep -q '^cutcat: ' log
