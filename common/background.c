@@ -8,6 +8,7 @@
  * so that a bin never holds more numbers than its neighbour.
  */
 #include "background.h"
+#include "darksky.h"
 #include "par.h"
 #include "simd.h"
 #include <float.h>
@@ -246,6 +247,7 @@ struct cells {
     const struct background_params *p;
     long mx, my;
     double *level, *sigma;         /* my*mx; NaN: no use */
+    struct darksky *dark;
 };
 
 WIDE static int all_finite(const float *v, long n)
@@ -284,10 +286,10 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
     float *buf = malloc(room * sizeof *buf);
     if (!buf)
         return E_NOMEM;
-    for (long j = begin; j < end; j++)
+    for (long j = begin; j < end; j++) {
+        long y0 = j * ny / c->my, y1 = (j + 1) * ny / c->my;
         for (long i = 0; i < c->mx; i++) {
             long x0 = i * nx / c->mx, x1 = (i + 1) * nx / c->mx;
-            long y0 = j * ny / c->my, y1 = (j + 1) * ny / c->my;
             long n = gather(c, x0, x1, y0, y1, buf), at = j * c->mx + i;
             c->level[at] = c->sigma[at] = NAN;
             if (n > 0 && n * 4 >= (x1 - x0) * (y1 - y0))
@@ -295,8 +297,25 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
             else if (n > 0 && c->mx * c->my == 1)
                 background_clip(buf, n, c->p->gain, c->p->removed, &c->level[at], &c->sigma[at]);
         }
+        darksky_rows(c->dark, c->im, c->rms_map, y0, y1);
+    }
     free(buf);
     return OK;
+}
+
+/* The level once more, from the blocks between objects. */
+static int darken_rows(void *ctx, long begin, long end, int worker)
+{
+    (void)worker;
+    const struct cells *c = ctx;
+    long nx = c->im->nx, ny = c->im->ny;
+    int st = OK;
+    for (long j = begin; j < end; j++)
+        for (long i = 0; i < c->mx && !st; i++)
+            if (c->sigma[j * c->mx + i] > 0)
+                st = darksky_level(c->dark, i * nx / c->mx, (i + 1) * nx / c->mx, j * ny / c->my, (j + 1) * ny / c->my,
+                                   c->sigma[j * c->mx + i], &c->level[j * c->mx + i]);
+    return st;
 }
 
 /*
@@ -622,7 +641,14 @@ int background_measure(struct background *b, const struct image *im, const float
     if (!c.level)
         return E_NOMEM;
     c.sigma = c.level + n;
-    int st = par_for(c.my, 1, p->threads, measure_rows, &c);
+    struct darksky dark = {0};
+    c.dark = &dark;
+    int st = darksky_new(&dark, im);
+    if (!st)
+        st = par_for(c.my, 1, p->threads, measure_rows, &c);
+    if (!st)
+        st = par_for(c.my, 1, p->threads, darken_rows, &c);
+    darksky_free(&dark);
     if (!st) {
         drop_dead_cells(&c);
         st = fill_bad(c.level, c.sigma, c.mx, c.my);
