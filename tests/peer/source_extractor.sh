@@ -57,7 +57,7 @@ read -r mm pm dm bm sm < <(score mine.cat)
 echo "# at 1.5 sigma both: Source Extractor matched $ms purity $ps position $ds px bias $bs mag; detect $mm $pm $dm $bm"
 between "matched, over Source Extractor's, at the same settings" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.99 1.2
 between "purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.005 0.1
-between "magnitude bias less Source Extractor's" "$(awk -v a="$bm" -v b="$bs" 'BEGIN { print a - b }')" -0.05 0.002
+between "magnitude bias less Source Extractor's" "$(awk -v a="$bm" -v b="$bs" 'BEGIN { print a - b }')" -0.05 0.005
 # the skies differ (photon noise moves Source Extractor's mode by 0.42 electron, faint light the other way): score at the same level in electrons
 k=$(awk '{ print 1.5 * (1 + ($12 - $25) / $26) * $13 / $26 }' pairs.txt | med)
 between "threshold that gives the same level" "$k" 1.45 1.6
