@@ -24,17 +24,20 @@ enum units { UNITS_TOTAL, UNITS_MEAN, UNITS_RATE };
 
 enum { BAND_BYTES = 16 << 20, CACHE_BYTES = 4 << 20, CHUNK_PIXELS = 1 << 19, MAX_EXPOSURES = 4096 };
 
+enum maps { MAP_WEIGHT, MAP_VAR, MAP_MASK, MAPS };
+enum weighting { WEIGHT_EXPTIME, WEIGHT_MAP, WEIGHT_IVM };
+
 struct request {
-    double scale, pixfrac, fill;
-    int kernel, units, flat;
+    double scale, pixfrac, fill, rotation, size[2], center[2];
+    int kernel, units, flat, weighting, turned, sized, centred;
     const char *like;
-    struct opt_strs weights;
+    struct opt_strs maps[MAPS];
 };
 
 /* One exposure. */
 struct shot {
-    struct fits_in *in, *weights;
-    int weight_index;
+    struct fits_in *in, *maps[MAPS];
+    int map_index[MAPS];
     struct exposure x;
     char label[400];
     uint64_t key;            /* of the content */
@@ -47,9 +50,9 @@ struct shot {
 struct work {
     struct request r;
     const struct common *c;
-    const char **names;      /* operands, then weights, then like */
+    const char **names;      /* operands, then maps, then like */
     size_t n_names, n;
-    struct fits_in **files;  /* operands, then weights */
+    struct fits_in **files;  /* operands, then the maps of each kind */
     struct shot *shot;
     long nx, ny;             /* of the output */
     struct header hdr;
@@ -63,7 +66,9 @@ struct band {
     long y0, ny;
     double *sum;             /* pairs of flux and weight */
     uint32_t *context;       /* planes of ny rows, or NULL */
-    float *pix, *map;        /* rows of the exposure */
+    double *var;
+    float *pix, *map[MAPS];  /* rows of the exposure; inverse variances take the place of weights */
+    unsigned char *bad;
     const struct shot *shot;
     struct drizzle_input input;
     uint32_t *plane;
@@ -72,9 +77,12 @@ struct band {
 
 /* ---- reading headers ---- */
 
-/* Weight images of a file: those named WHT, else its exposures. */
-static void list_weights(const struct fits_in *f, const char *name, int **list, size_t *n)
+static const char *const map_names[MAPS] = {"weight", "var", "mask"};
+
+/* Maps of a file: the images named WHT, VAR or DQ, else its exposures. */
+static void list_maps(const struct fits_in *f, const char *name, enum maps kind, int **list, size_t *n)
 {
+    static const char *const extname[MAPS] = {"WHT", "VAR", "DQ"};
     struct err e;
     if (exposure_list(f, name, list, n, &e))
         die(EXIT_RUN, "%s", e.text);
@@ -86,7 +94,7 @@ static void list_weights(const struct fits_in *f, const char *name, int **list, 
         die(EXIT_RUN, "%s: %s", name, err_text(E_NOMEM));
     size_t k = 0;
     for (int i = 0; i < fits_in_count(f); i++)
-        if (fits_in_hdu(f, i)->is_image && strcasecmp(fits_in_hdu(f, i)->extname, "WHT") == 0)
+        if (fits_in_hdu(f, i)->is_image && strcasecmp(fits_in_hdu(f, i)->extname, extname[kind]) == 0)
             found[k++] = i;
     if (k == 0) {
         free(found);
@@ -106,23 +114,37 @@ static struct fits_in *open_file(const struct work *w, const char *name)
     return f;
 }
 
+/* The maps of one kind of operand k, for its n exposures from shot on. */
+static void add_maps(struct work *w, size_t k, enum maps kind, struct shot *shot, size_t n)
+{
+    const char *name = w->r.maps[kind].v[k];
+    int *list;
+    size_t count;
+    struct fits_in *f = w->files[(1 + (size_t)kind) * (size_t)w->c->argc + k] = open_file(w, name);
+    list_maps(f, name, kind, &list, &count);
+    if (count != n)
+        die(EXIT_RUN, "%s: %zu %s images for %zu exposures of %s", name, count, map_names[kind], n, w->c->argv[k]);
+    for (size_t i = 0; i < n; i++) {
+        const struct hdu *h = fits_in_hdu(f, list[i]);
+        shot[i].maps[kind] = f;
+        shot[i].map_index[kind] = list[i];
+        if (h->nx != shot[i].x.nx || h->ny != shot[i].x.ny)
+            die(EXIT_RUN, "%s: the %s image is %ld x %ld, the exposure %ld x %ld", shot[i].label, map_names[kind], h->nx, h->ny,
+                shot[i].x.nx, shot[i].x.ny);
+    }
+    free(list);
+}
+
 /* All exposures of one operand. */
 static void add_file(struct work *w, size_t k)
 {
     const char *name = w->c->argv[k];
     struct err e;
-    int *list, *weights = NULL;
-    size_t n, n_weights = 0;
-    struct fits_in *in = w->files[k] = open_file(w, name), *win = NULL;
+    int *list;
+    size_t n;
+    struct fits_in *in = w->files[k] = open_file(w, name);
     if (exposure_list(in, name, &list, &n, &e))
         die(EXIT_RUN, "%s", e.text);
-    if (w->r.weights.n) {
-        const char *wname = w->r.weights.v[k];
-        win = w->files[(size_t)w->c->argc + k] = open_file(w, wname);
-        list_weights(win, wname, &weights, &n_weights);
-        if (n_weights != n)
-            die(EXIT_RUN, "%s: %zu weight images for %zu exposures of %s", wname, n_weights, n, name);
-    }
     if (w->n + n > MAX_EXPOSURES)
         die(EXIT_RUN, "%s: more than %d exposures", name, MAX_EXPOSURES);
     struct shot *more = realloc(w->shot, (w->n + n) * sizeof *more);
@@ -130,19 +152,19 @@ static void add_file(struct work *w, size_t k)
         die(EXIT_RUN, "%s: %s", name, err_text(E_NOMEM));
     w->shot = more;
     for (size_t i = 0; i < n; i++) {
-        struct shot *s = &w->shot[w->n++];
-        *s = (struct shot){.in = in, .weights = win, .weight_index = win ? weights[i] : -1};
+        struct shot *s = &w->shot[w->n + i];
+        *s = (struct shot){.in = in};
         exposure_label(in, name, list[i], s->label, sizeof s->label);
         if (exposure_read(in, name, list[i], &s->x, &e))
             die(EXIT_RUN, "%s", e.text);
         if (sky_open(&s->sky, &s->x.hdr, &e))
             die(EXIT_RUN, "%s: no usable WCS: %s", s->label, e.text);
-        const struct hdu *h = win ? fits_in_hdu(win, weights[i]) : NULL;
-        if (h && (h->nx != s->x.nx || h->ny != s->x.ny))
-            die(EXIT_RUN, "%s: weights are %ld x %ld, the exposure %ld x %ld", s->label, h->nx, h->ny, s->x.nx, s->x.ny);
     }
+    for (int kind = 0; kind < MAPS; kind++)
+        if (w->r.maps[kind].n)
+            add_maps(w, k, (enum maps)kind, &w->shot[w->n], n);
+    w->n += n;
     free(list);
-    free(weights);
 }
 
 /* ---- order of the exposures ---- */
@@ -196,17 +218,18 @@ static void sort_shots(struct work *w)
         for (size_t k = 0; k < s->x.hdr.n; k++)
             hash(&s->key, s->x.hdr.card[k], 80);
         hash_pixels(&s->key, s->in, s->x.index, s->x.nx, s->x.ny);
-        if (s->weights)
-            hash_pixels(&s->key, s->weights, s->weight_index, s->x.nx, s->x.ny);
+        for (int kind = 0; kind < MAPS; kind++)
+            if (s->maps[kind])
+                hash_pixels(&s->key, s->maps[kind], s->map_index[kind], s->x.nx, s->x.ny);
     }
     qsort(w->shot, w->n, sizeof *w->shot, by_key);
 }
 
-/* Operands and weights in the order of their first exposures, for the record. */
+/* Operands and maps in the order of their first exposures, for the record. */
 static void sort_names(struct work *w)
 {
     const size_t n = (size_t)w->c->argc;
-    const char **argv = malloc(2 * n * sizeof *argv), **weights = argv + n;
+    const char **argv = malloc((1 + MAPS) * n * sizeof *argv);
     if (!argv)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
     size_t k = 0;
@@ -214,15 +237,22 @@ static void sort_names(struct work *w)
         for (size_t f = 0; f < n; f++)
             if (w->c->argv[f] && w->shot[i].in == w->files[f]) {
                 argv[k] = w->c->argv[f];
-                if (w->r.weights.n)
-                    weights[k] = w->r.weights.v[f];
+                for (size_t kind = 0; kind < MAPS; kind++)
+                    argv[(1 + kind) * n + k] = w->r.maps[kind].n ? w->r.maps[kind].v[f] : NULL;
                 k++;
                 w->c->argv[f] = NULL;
             }
     memcpy(w->c->argv, argv, n * sizeof *argv);
-    if (w->r.weights.n)
-        memcpy(w->r.weights.v, weights, n * sizeof *weights);
+    for (size_t kind = 0; kind < MAPS; kind++)
+        if (w->r.maps[kind].n)
+            memcpy(w->r.maps[kind].v, argv + (1 + kind) * n, n * sizeof *argv);
     free(argv);
+}
+
+static void set(int *st, int now)
+{
+    if (*st == OK)
+        *st = now;
 }
 
 /* ---- the output grid ---- */
@@ -266,6 +296,31 @@ static void make_maps(struct work *w)
     }
 }
 
+/*
+ * A TAN around --center, else the first exposure's middle, its y axis --rotation
+ * degrees from north through east; of --size, else to be grown.
+ */
+static void chosen_grid(struct work *w, double scale)
+{
+    const struct shot *first = &w->shot[0];
+    const struct request *r = &w->r;
+    const double x = 0.5 * (double)(first->x.nx - 1), y = 0.5 * (double)(first->x.ny - 1);
+    const double turn = (r->turned ? r->rotation : 0) * (M_PI / 180), c = scale / 3600 * cos(turn), s = scale / 3600 * sin(turn);
+    double at[2] = {r->center[0], r->center[1]};
+    if (!r->centred && sky_from_pixel(first->sky, 1, &x, &y, &at[0], &at[1]))
+        die(EXIT_RUN, "%s: its middle is not on the sky: give --center", first->label);
+    w->nx = r->sized ? (long)r->size[0] : 1;
+    w->ny = r->sized ? (long)r->size[1] : 1;
+    exposure_remove_wcs(&w->hdr);
+    int st = sky_set_tan(&w->hdr, scale, 0.5 * (double)(w->nx + 1), 0.5 * (double)(w->ny + 1), at[0], at[1]);
+    set(&st, header_set_double(&w->hdr, "CD1_1", -c, "deg per pixel"));
+    set(&st, header_set_double(&w->hdr, "CD1_2", s, "deg per pixel"));
+    set(&st, header_set_double(&w->hdr, "CD2_1", s, "deg per pixel"));
+    set(&st, header_set_double(&w->hdr, "CD2_2", c, "deg per pixel"));
+    if (st)
+        die(EXIT_RUN, "output grid: %s", err_text(st));
+}
+
 /* Grid of the first exposure, finer by the ratio of the scales, grown by whole pixels to hold every drop. */
 static void own_grid(struct work *w)
 {
@@ -283,7 +338,11 @@ static void own_grid(struct work *w)
     }
     if (st)
         die(EXIT_RUN, "%s: %s", first->label, err_text(st));
+    if (w->r.turned || w->r.sized || w->r.centred)
+        chosen_grid(w, out);
     make_maps(w);
+    if (w->r.sized)
+        return;
     const double half = w->r.kernel == DRIZZLE_POINT ? 0 : 0.5 * w->r.pixfrac;
     double least[2] = {0, 0}, most[2] = {0, 0};
     for (size_t i = 0; i < w->n; i++) {
@@ -372,9 +431,10 @@ static void set_units(struct work *w)
     for (size_t i = 0; i < w->n; i++) {
         struct shot *s = &w->shot[i];
         const double time = s->x.unit == UNIT_RATE ? 1 : s->x.exptime;
-        s->w = s->weights || isnan(w->total) ? 1 : s->x.exptime;
         s->factor = w->r.units == UNITS_MEAN ? area
                   : w->r.units == UNITS_RATE ? s->area / time : s->area * (w->total / time);
+        s->w = w->r.weighting == WEIGHT_IVM ? 1 / (s->factor * s->factor)
+             : w->r.weighting == WEIGHT_MAP || isnan(w->total) ? 1 : s->x.exptime;
         times += s->w * s->x.exptime;
         weights += s->w;
     }
@@ -382,12 +442,6 @@ static void set_units(struct work *w)
 }
 
 static const char *const kernel_names[] = {"square", "point", "turbo", "gaussian", "lanczos2", "lanczos3"};
-
-static void set(int *st, int now)
-{
-    if (*st == OK)
-        *st = now;
-}
 
 /* Mean of a keyword of the exposures in units of the output; NaN when one lacks it. */
 static double mean_level(const struct work *w, const char *key)
@@ -409,6 +463,11 @@ static double noise_factor(const struct work *w)
     for (size_t i = 0; i < w->n && !split; i++)
         split = drizzle_splits(kernel, w->r.pixfrac, &w->shot[i].map, w->shot[i].x.nx, w->shot[i].x.ny);
     return split ? drizzle_noise_factor(kernel, w->r.pixfrac, w->shot[0].map.scale) : 1;
+}
+
+static const char *weight_type(const struct work *w)
+{
+    return w->r.weighting == WEIGHT_IVM ? "IVM" : w->r.weighting == WEIGHT_MAP ? "MAP" : isnan(w->total) ? "NUMBER" : "EXPTIME";
 }
 
 static void describe(struct work *w, const char *record)
@@ -441,7 +500,7 @@ static void describe(struct work *w, const char *record)
     set(&st, header_set_double(h, "PIXSCALE", sky_scale(w->sky), "arcsec per pixel"));
     set(&st, header_set_double(h, "PIXFRAC", w->r.pixfrac, "side of a drop, input pixels"));
     set(&st, header_set_str(h, "KERNEL", kernel_names[w->r.kernel], "shape of a drop"));
-    set(&st, header_set_str(h, "WHTTYPE", w->r.weights.n ? "MAP" : isnan(w->total) ? "NUMBER" : "EXPTIME", "unit of the weight"));
+    set(&st, header_set_str(h, "WHTTYPE", weight_type(w), "unit of the weight"));
     set(&st, header_set_long(h, "NCOMBINE", (long)w->n, "exposures"));
     set(&st, header_set_double(h, "NOISECOR", noise_factor(w), "noise of large areas over that of pixels"));
     set(&st, header_history(h, record));
@@ -463,7 +522,7 @@ static int add_parts(void *ctx, long begin, long end, int worker)
         const size_t at = (size_t)from * (size_t)w->nx;
         struct drizzle_band part = {
             .nx = w->nx, .y0 = b->y0 + from, .ny = to - from, .sum = b->sum + 2 * at,
-            .context = b->plane ? b->plane + at : NULL,
+            .context = b->plane ? b->plane + at : NULL, .var = b->var ? b->var + at : NULL,
         };
         if (to > from)
             st = drizzle_rows((enum drizzle_kernel)w->r.kernel, w->r.pixfrac, &b->shot->map, &b->input, &part);
@@ -485,6 +544,19 @@ static void needed_rows(const struct shot *s, double low, double high, long *fir
     *end = (long)fmin((double)s->x.ny, fmax(ceil(fmax(p, q)) + 1, 0));
 }
 
+/* The weights of the n pixels read; masks become bytes. */
+static const float *choose_weights(const struct work *w, struct band *b, size_t n)
+{
+    float *weight = b->map[MAP_WEIGHT], *var = b->map[MAP_VAR], *mask = b->map[MAP_MASK];
+    for (size_t i = 0; i < n && mask; i++)
+        b->bad[i] = !(mask[i] <= 0 && mask[i] >= 0);
+    if (w->r.weighting == WEIGHT_EXPTIME)
+        return weight;
+    for (size_t i = 0; i < n && !w->r.maps[MAP_WEIGHT].n; i++)
+        weight[i] = 1 / var[i];
+    return weight;
+}
+
 /* All rows of one exposure that reach the band. */
 static int add_shot(struct work *w, struct band *b, const struct shot *s, struct err *e)
 {
@@ -501,13 +573,15 @@ static int add_shot(struct work *w, struct band *b, const struct shot *s, struct
         if (hi[1] < (double)b->y0 - reach || lo[1] > (double)(b->y0 + b->ny) + reach)
             continue;
         int st = fits_in_rows(s->in, s->x.index, 0, y, here, b->pix, e);
-        if (st == OK && s->weights)
-            st = fits_in_rows(s->weights, s->weight_index, 0, y, here, b->map, e);
+        for (int kind = 0; kind < MAPS && st == OK; kind++)
+            if (s->maps[kind])
+                st = fits_in_rows(s->maps[kind], s->map_index[kind], 0, y, here, b->map[kind], e);
         if (st)
             return st;
+        const float *weight = choose_weights(w, b, (size_t)here * (size_t)s->x.nx);
         b->input = (struct drizzle_input){
-            .nx = s->x.nx, .y0 = y, .ny = here, .pix = b->pix, .weight = s->weights ? b->map : NULL,
-            .w = s->w, .scale = s->factor, .bit = (uint32_t)1 << ((s - w->shot) & 31),
+            .nx = s->x.nx, .y0 = y, .ny = here, .pix = b->pix, .weight = weight, .var = b->var ? b->map[MAP_VAR] : NULL,
+            .bad = s->maps[MAP_MASK] ? b->bad : NULL, .w = s->w, .scale = s->factor, .bit = (uint32_t)1 << ((s - w->shot) & 31),
         };
         st = par_for(b->parts, 1, w->c->threads, add_parts, ctx);
         if (st)
@@ -518,16 +592,16 @@ static int add_shot(struct work *w, struct band *b, const struct shot *s, struct
 
 /* Temporary files of what comes after SCI. */
 struct spool {
-    FILE *weight, **context;
+    FILE *weight, *var, **context;
     size_t planes;
 };
 
-static int spool_open(struct spool *sp, size_t planes, struct err *e)
+static int spool_open(struct spool *sp, size_t planes, int var, struct err *e)
 {
     sp->context = calloc(planes ? planes : 1, sizeof *sp->context);
     sp->planes = planes;
     sp->weight = tmpfile();
-    int good = sp->context && sp->weight;
+    int good = sp->context && sp->weight && (!var || (sp->var = tmpfile()));
     for (size_t p = 0; p < planes && good; p++)
         good = (sp->context[p] = tmpfile()) != NULL;
     return good ? OK : err_set(e, E_IO, "temporary file: %s", strerror(errno));
@@ -537,6 +611,8 @@ static void spool_close(struct spool *sp)
 {
     if (sp->weight)
         fclose(sp->weight);
+    if (sp->var)
+        fclose(sp->var);
     for (size_t p = 0; p < sp->planes && sp->context; p++)
         if (sp->context[p])
             fclose(sp->context[p]);
@@ -562,6 +638,10 @@ static int write_band(const struct work *w, struct band *b, struct fits_out *out
         for (size_t i = 0; i < n; i++)
             v[i] = (float)b->sum[2 * i + 1];
         st = spool_add(sp->weight, v, n, e);
+        for (size_t i = 0; i < n && sp->var; i++)
+            v[i] = b->sum[2 * i + 1] != 0 ? (float)(b->var[i] / (b->sum[2 * i + 1] * b->sum[2 * i + 1])) : (float)w->r.fill;
+        if (st == OK && sp->var)
+            st = spool_add(sp->var, v, n, e);
         for (size_t p = 0; p < sp->planes && st == OK; p++)
             st = spool_add(sp->context[p], b->context + p * n, n, e);
     }
@@ -592,12 +672,20 @@ static int write_rest(const struct work *w, struct spool *sp, struct fits_out *o
     struct header h = {0};
     int st = exposure_copy_wcs(&h, &w->hdr);
     set(&st, header_set_str(&h, "EXTNAME", "WHT", NULL));
-    set(&st, header_set_str(&h, "WHTTYPE", w->r.weights.n ? "MAP" : isnan(w->total) ? "NUMBER" : "EXPTIME", "unit of the weight"));
+    set(&st, header_set_str(&h, "WHTTYPE", weight_type(w), "unit of the weight"));
     if (st)
         return err_set(e, st, "header: %s", err_text(st));
     st = fits_out_hdu(out, -32, w->nx, w->ny, 1, &h, e);
     if (st == OK)
         st = copy_plane(w, sp->weight, 0, out, e);
+    if (st == OK && sp->var) {
+        header_remove(&h, "WHTTYPE");
+        st = header_set_str(&h, "EXTNAME", "VAR", "variance of SCI, BUNIT squared");
+        if (st == OK)
+            st = fits_out_hdu(out, -32, w->nx, w->ny, 1, &h, e);
+        if (st == OK)
+            st = copy_plane(w, sp->var, 0, out, e);
+    }
     if (st == OK && sp->planes) {
         header_remove(&h, "WHTTYPE");
         st = header_set_str(&h, "EXTNAME", "CTX", "bit i of plane p: exposure 32 p + i");
@@ -638,7 +726,7 @@ static int upright(const struct work *w)
 /* SCI, band by band. */
 static int fill_bands(struct work *w, struct fits_out *out, struct spool *sp, struct err *e)
 {
-    const size_t cell = 2 * sizeof(double) + sp->planes * sizeof(uint32_t);
+    const size_t cell = (sp->var ? 3 : 2) * sizeof(double) + sp->planes * sizeof(uint32_t);
     long rows = (long)((upright(w) ? CACHE_BYTES : BAND_BYTES) / ((size_t)w->nx * cell));
     rows = rows < 16 ? 16 : rows > w->ny ? w->ny : rows;
     const size_t n = (size_t)rows * (size_t)w->nx, chunk = (size_t)(CHUNK_PIXELS + widest(w));
@@ -646,12 +734,18 @@ static int fill_bands(struct work *w, struct fits_out *out, struct spool *sp, st
     b.sum = room(2 * n, sizeof *b.sum);
     b.context = sp->planes ? room(n * sp->planes, sizeof *b.context) : NULL;
     b.pix = room(chunk, sizeof *b.pix);
-    b.map = w->r.weights.n ? room(chunk, sizeof *b.map) : NULL;
+    for (int kind = 0; kind < MAPS; kind++)
+        if (w->r.maps[kind].n || (kind == MAP_WEIGHT && w->r.weighting != WEIGHT_EXPTIME))
+            b.map[kind] = room(chunk, sizeof *b.map[kind]);
+    b.bad = b.map[MAP_MASK] ? room(chunk, sizeof *b.bad) : NULL;
+    b.var = sp->var ? room(n, sizeof *b.var) : NULL;
     int st = OK;
     for (b.y0 = 0; b.y0 < w->ny && st == OK; b.y0 += rows) {
         b.ny = w->ny - b.y0 < rows ? w->ny - b.y0 : rows;
         const size_t here = (size_t)b.ny * (size_t)w->nx;
         memset(b.sum, 0, 2 * here * sizeof *b.sum);
+        if (b.var)
+            memset(b.var, 0, here * sizeof *b.var);
         if (b.context)
             memset(b.context, 0, here * sp->planes * sizeof *b.context);
         for (size_t i = 0; i < w->n && st == OK; i++) {
@@ -664,8 +758,11 @@ static int fill_bands(struct work *w, struct fits_out *out, struct spool *sp, st
     }
     free(b.sum);
     free(b.context);
+    free(b.var);
+    free(b.bad);
     free(b.pix);
-    free(b.map);
+    for (int kind = 0; kind < MAPS; kind++)
+        free(b.map[kind]);
     return st;
 }
 
@@ -678,7 +775,7 @@ static int write_all(struct work *w, struct err *e)
     if (st)
         return st;
     if (!w->r.flat)
-        st = spool_open(&sp, w->n > 1 ? (w->n + 31) / 32 : 0, e);
+        st = spool_open(&sp, w->n > 1 ? (w->n + 31) / 32 : 0, w->r.maps[MAP_VAR].n > 0, e);
     progress_begin(&w->bar, "drizzle", (long)w->n * w->ny, w->c->quiet);
     if (st == OK) {
         st = header_copy(&h, &w->hdr);
@@ -720,12 +817,13 @@ static void run(struct work *w, const struct program *prog, const struct opt *ow
 {
     const size_t n = (size_t)w->c->argc;
     struct err e;
-    w->names = room(2 * n + 1, sizeof *w->names);
-    w->files = room(2 * n, sizeof *w->files);
+    w->names = room((1 + MAPS) * n + 1, sizeof *w->names);
+    w->files = room((1 + MAPS) * n, sizeof *w->files);
     for (size_t i = 0; i < n; i++)
         w->names[w->n_names++] = w->c->argv[i];
-    for (size_t i = 0; i < w->r.weights.n; i++)
-        w->names[w->n_names++] = w->r.weights.v[i];
+    for (int kind = 0; kind < MAPS; kind++)
+        for (size_t i = 0; i < w->r.maps[kind].n; i++)
+            w->names[w->n_names++] = w->r.maps[kind].v[i];
     if (w->r.like)
         w->names[w->n_names++] = w->r.like;
     for (size_t i = 0; i < n; i++)
@@ -751,13 +849,36 @@ static void run(struct work *w, const struct program *prog, const struct opt *ow
         drizzle_map_free(&w->shot[i].map);
         header_free(&w->shot[i].x.hdr);
     }
-    for (size_t i = 0; i < 2 * n; i++)
-        fits_in_close(w->files[i]);
+    for (size_t i = 0; i < (1 + MAPS) * n; i++)
+        if (w->files[i])
+            fits_in_close(w->files[i]);
     sky_close(w->sky);
     header_free(&w->hdr);
     free(w->shot);
     free(w->files);
     free(w->names);
+}
+
+static void check_options(struct request *r, const struct opt *own, const struct common *c)
+{
+    r->turned = opt_given(own, c, "rotation");
+    r->sized = opt_given(own, c, "size");
+    r->centred = opt_given(own, c, "center");
+    if (r->like && (!isnan(r->scale) || r->turned || r->sized || r->centred))
+        die(EXIT_USAGE, "--like and --pixscale, --rotation, --size, --center both set the grid: give one");
+    if (r->sized && (r->size[0] != floor(r->size[0]) || r->size[1] != floor(r->size[1])))
+        die(EXIT_USAGE, "--size takes whole numbers");
+    if (r->centred && !(fabs(r->center[1]) <= 90))
+        die(EXIT_USAGE, "--center: declination is -90 to 90 degrees");
+    for (int kind = 0; kind < MAPS; kind++)
+        if (r->maps[kind].n && r->maps[kind].n != (size_t)c->argc)
+            die(EXIT_USAGE, "--%s was given %zu times for %d operands", map_names[kind], r->maps[kind].n, c->argc);
+    if (!opt_given(own, c, "weight-type"))
+        r->weighting = r->maps[MAP_WEIGHT].n ? WEIGHT_MAP : WEIGHT_EXPTIME;
+    if (r->weighting == WEIGHT_MAP && !r->maps[MAP_WEIGHT].n)
+        die(EXIT_USAGE, "--weight-type map needs --weight");
+    if (r->weighting == WEIGHT_IVM && !r->maps[MAP_WEIGHT].n && !r->maps[MAP_VAR].n)
+        die(EXIT_USAGE, "--weight-type ivm needs --weight or --var");
 }
 
 int main(int argc, char **argv)
@@ -775,17 +896,21 @@ int main(int argc, char **argv)
         {"pixfrac", 0, OPT_REAL, &r->pixfrac, 0, 8, "P", "side of a drop, input pixels", 0, 0},
         {"kernel", 0, OPT_CHOICE, &r->kernel, 0, 0, 0, "shape of a drop", "square|point|turbo|gaussian|lanczos2|lanczos3", 0},
         {"like", 0, OPT_STR, &r->like, 0, 0, "FILE", "take size and WCS of the output from this image", 0, 1},
-        {"weight", 'w', OPT_STRS, &r->weights, 0, 0, "FILE", "weight map; once per operand, same order", 0, 1},
+        {"rotation", 0, OPT_REAL, &r->rotation, -360, 360, "DEG", "direction of the output's y axis, from north to east", 0, 0},
+        {"size", 0, OPT_PAIR, r->size, 1, 65535, "NX,NY", "output pixels; default all that holds a drop", 0, 0},
+        {"center", 0, OPT_PAIR, r->center, -360, 360, "RA,DEC", "middle of the output, deg; default the first exposure's", 0, 0},
+        {"weight", 'w', OPT_STRS, &r->maps[MAP_WEIGHT], 0, 0, "FILE", "weight map; once per operand, same order", 0, 1},
+        {"var", 0, OPT_STRS, &r->maps[MAP_VAR], 0, 0, "FILE", "variance map, likewise: write VAR", 0, 1},
+        {"mask", 0, OPT_STRS, &r->maps[MAP_MASK], 0, 0, "FILE", "bad pixels, not 0, likewise", 0, 1},
+        {"weight-type", 0, OPT_CHOICE, &r->weighting, 0, 0, 0, "meaning of the weight; default map with --weight, else exptime",
+         "exptime|map|ivm", 0},
         {"units", 0, OPT_CHOICE, &r->units, 0, 0, 0, "of SCI; default total when EXPTIME is known", "total|mean|rate", 0},
         {"fill", 0, OPT_REAL, &r->fill, -1e38, 1e38, "V", "value of pixels without weight; default NaN", 0, 0},
         {"flat", 0, OPT_FLAG, &r->flat, 0, 0, 0, "write SCI alone, as primary image", 0, 0},
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    if (r->like && !isnan(r->scale))
-        die(EXIT_USAGE, "--like and --pixscale both set the grid: give one");
-    if (r->weights.n && r->weights.n != (size_t)c.argc)
-        die(EXIT_USAGE, "--weight was given %zu times for %d operands", r->weights.n, c.argc);
+    check_options(r, own, &c);
     run(&w, &prog, own);
     opt_free(own);
     return EXIT_DONE;

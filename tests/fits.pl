@@ -40,7 +40,7 @@ else {
     if ($do eq 'card') { my $v = $h->{k}{$a[1]} // ''; $v =~ s/^'(.*?) *'$/$1/; print "$v\n" }
     else {
         my @p = pixels($h); my $nx = $h->{k}{NAXIS1};
-        if ($do eq 'dump') { for my $i (0 .. $#p) { printf "%d %d %.9g\n", $i % $nx, int($i / $nx), $p[$i] } }
+        if ($do eq 'dump') { my $as = $h->{k}{BITPIX} > 0 ? "%d" : "%.9g"; for my $i (0 .. $#p) { printf "%d %d $as\n", $i % $nx, int($i / $nx), $p[$i] } }
         else { my ($n, $s, $ss, $lo, $hi) = (0, 0, 0); for (@p) { next if $_ != $_; $n++; $s += $_; $lo = $_ if !defined $lo || $_ < $lo; $hi = $_ if !defined $hi || $_ > $hi }
             my $m = $n ? $s / $n : 'nan'; for (@p) { $ss += ($_ - $m) ** 2 if $_ == $_ } printf "%.9g %.9g %.9g %.9g %d %.12g\n", $m, $ss / ($n > 1 ? $n - 1 : 1), $lo // 'nan', $hi // 'nan', $n, $s }
     }

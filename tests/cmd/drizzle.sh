@@ -117,6 +117,57 @@ drizzle p1.fits p2.fits --units mean -o pole.fits
 near "pole: flux of both" "$(paste -d' ' <($F dump pole.fits 1) <($F dump pole.fits 2 | cut -d' ' -f3) | awk '$4 > 0 { s += $3 * $4 } END { printf "%.3f", s / 10 / 1600 / 2 }')" 29.5 1e-3
 near "pole: pixels fall on pixels, NOISECOR" "$($F card pole.fits 1 NOISECOR)" 1 0
 
+# ---- variances: sum (w a s)^2 var / (sum w a)^2, by hand; inverse-variance weights; masks
+at() { $F dump "$1" "$2" | awk -v x="$3" -v y="$4" '$1 == x && $2 == y { print $3 }'; }
+$F make va.fits 15 15 50; $F make vc.fits 15 15 200
+drizzle a.fits c.fits --var va.fits --var vc.fits --units mean -o v.fits
+near "HDUs: SCI, WHT, VAR, CTX" "$($F count v.fits)" 5 0
+near "VAR: (100^2 50 + 100^2 200)/200^2" "$(at v.fits 3 5 5)" 62.5 1e-5
+drizzle a.fits c.fits --var va.fits --var vc.fits --units total -o v.fits
+near "VAR of a total: times (200/100)^2" "$(at v.fits 3 5 5)" 250 1e-4
+drizzle a.fits c.fits --var va.fits --var vc.fits --units mean --weight-type ivm -o v.fits
+near "ivm: (200/50 + 1000/200)/(1/50 + 1/200)" "$(at v.fits 1 5 5)" 360 1e-4
+near "ivm: VAR 1/(1/50 + 1/200)" "$(at v.fits 3 5 5)" 40 1e-5
+[ "$($F card v.fits 1 WHTTYPE)" = IVM ] && pass "WHTTYPE IVM" || fail "WHTTYPE $($F card v.fits 1 WHTTYPE)"
+$F make ia.fits 15 15 0.02; $F make ic.fits 15 15 0.005
+drizzle a.fits c.fits --weight ia.fits --weight ic.fits --units mean --weight-type ivm -o v2.fits
+near "ivm from maps of 1/var: the same" "$(at v2.fits 1 5 5)" 360 1e-4
+$F make ma.fits 15 15 '$x == 5 ? 4 : 0'; $F make mc.fits 15 15 '$y == 7 ? -1 : 0'
+drizzle a.fits c.fits --mask ma.fits --mask mc.fits --units mean -o m.fits
+near "mask: only the second exposure" "$(at m.fits 1 5 5)" 1000 1e-4
+near "mask: only the first" "$(at m.fits 1 6 7)" 200 1e-5
+near "mask: both elsewhere" "$(at m.fits 1 6 6)" 600 1e-4
+near "mask: nothing left" "$($F dump m.fits 1 | awk '$1 == 5 && $2 == 7 { print (tolower($3) ~ /nan/) }')" 1 0
+# noise of a real stack against VAR: white noise of variance 100, drops spread over pixels
+$F make flat.fits 120 120 100 "EXPTIME = 100.0" "BUNIT   = 'electron'" "${W1[@]}"; $F make hundred.fits 120 120 100
+addnoise -s 5 flat.fits -o white.fits
+drizzle white.fits -x 0.13 --pixfrac 0.9 --var hundred.fits --units mean -o w.fits
+between "variance of the pixels over mean VAR" "$(awk "BEGIN { print $($F stat w.fits 1 | cut -d' ' -f2) / $($F stat w.fits 3 | cut -d' ' -f1) }")" 0.93 1.07
+
+# ---- a chosen grid
+drizzle a.fits --rotation 30 --size 61,41 --center 150.0005,2.2002 -x 0.1 -o g.fits
+[ "$($F card g.fits 1 NAXIS1)x$($F card g.fits 1 NAXIS2)" = 61x41 ] && pass "--size" || fail "--size"
+near "--center" "$($F card g.fits 1 CRVAL1)" 150.0005 0
+near "--rotation: CD1_2 = scale sin 30" "$($F card g.fits 1 CD1_2)" "$(awk 'BEGIN { printf "%.15g", 0.5 * 0.1 / 3600 }')" 1e-18
+drizzle a.fits --rotation 30 -o g.fits --units mean
+near "--rotation alone: the grid holds all seconds" "$($F dump g.fits 2 | awk '{ s += $3 } END { print s }')" 22500 0.1
+fails "--like and --rotation" 2 drizzle a.fits --like grid.fits --rotation 3 -o no.fits
+fails "--weight-type ivm without maps" 2 drizzle a.fits --weight-type ivm -o no.fits
+
+# ---- 256 exposures: eight planes, bit e set where exposure e is
+for ((e = 0; e < 256; e++)); do
+    mapfile -t We < <(wcs "$((8 - e % 16)).0" "$((8 - e / 16)).0" 5.555555555555556E-5)
+    if [ $e = 0 ]; then $F make many.fits 0 0 0; fi
+    $F add many.fits 3 3 $((e + 1)) "EXTNAME = 'SCI'" "EXTVER  = $((e + 1))" "EXPNUM  = $((e + 1))" "EXPTIME = 1.0" "${We[@]}"
+done
+ok "256 exposures" drizzle many.fits --units mean -o many.out.fits
+near "CTX planes" "$($F card many.out.fits 3 NAXIS3)" 8 0
+$F dump many.out.fits 3 >ctx.txt
+near "every bit set on nine pixels" "$(perl -ne '@a = split; $b = $a[2] & 0xffffffff; $n++ while $b && ($b & 1 ? ++$s : 1) && ($b >>= 1); END { print $s }' ctx.txt)" 2304 0
+# pixel (0,0) of the output belongs to exposure 0 alone, its last corner to exposure 255
+near "the first bit alone in the first corner" "$(awk 'NR == 1 { print $3 }' ctx.txt)" 1 0
+near "the last bit alone in the last corner" "$(tail -1 ctx.txt | cut -d' ' -f3)" -2147483648 0
+
 # ---- reference images
 truth=$SHARED/truth/drizzle
 if [ -d "$truth" ] && python3=$(command -v /usr/bin/python3) && $python3 -c 'import astropy' 2>/dev/null; then
