@@ -6,6 +6,7 @@
  */
 #include "emit.h"
 #include "err.h"
+#include "field.h"
 #include "image.h"
 #include "imageio.h"
 #include "models.h"
@@ -24,6 +25,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define FIELD_MARGIN 26.0      /* arcsec around the field of --method field */
+
 /* What the user asks for. */
 struct request {
     const char *models, *psf, *set;
@@ -37,6 +40,7 @@ struct request {
     double box[2];           /* arcsec, of the pixel's response; 0: the pixel */
     double centre[2];        /* deg */
     int no_pixel;
+    int whole;               /* --method field */
     struct psf_options psf_options;
     struct accuracy accuracy;
 };
@@ -70,6 +74,8 @@ static void check_options(const struct request *r, const struct opt *own, const 
             die(EXIT_USAGE, "--%s needs a PSF: give -p FILE", name[i]);
     if (r->box[0] > 0 && r->no_pixel)
         die(EXIT_USAGE, "--pixel and --no-pixel: give one");
+    if (r->whole && !r->psf)
+        die(EXIT_USAGE, "--method field convolves with a PSF: give -p FILE");
     if (opt_given(own, c, "size") && (r->size[0] != floor(r->size[0]) || r->size[1] != floor(r->size[1])))
         die(EXIT_USAGE, "--size %g,%g: whole numbers of pixels, please", r->size[0], r->size[1]);
 }
@@ -270,6 +276,38 @@ static void draw(const struct plan *p, struct image *im, const struct common *c)
     check(st);
 }
 
+/* The whole scene in one convolution; in place of a plan of stamps. */
+static void draw_field(const struct view *v, const struct request *r, const struct common *c, const struct emission *e,
+                       struct image *im)
+{
+    struct field f;
+    struct progress bar;
+    size_t bad = 0;
+    if (field_plan(&f, v, FIELD_MARGIN))
+        die(EXIT_RUN, "%s: the field is too large for one convolution: leave --method field out", c->argv[0]);
+    if (c->check || c->verbose)
+        fprintf(stderr, "simage: one convolution of %ld x %ld pixels of %g\", blurred by %.4f\"; about %.0f MB\n", (long)f.nx * f.split,
+                (long)f.ny * f.split, v->pixel / f.split, f.sigma, 1e-6 * f.bytes);
+    if (f.bytes > c->max_memory)
+        die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", c->argv[0], 1e-6 * f.bytes);
+    if (c->check)
+        return;
+    progress_begin(&bar, "simage", (long)e->n, c->quiet);
+    int st = field_render(&f, v, &r->accuracy, e->n, e->emitter, im, c->threads, &bar, &bad);
+    progress_end(&bar);
+    check(st);
+    if (bad && !c->quiet)
+        warn("%s: %zu objects cannot be drawn: left out", c->argv[0], bad);
+}
+
+/* New pixels; the header stays. */
+static void make_image(struct image *im, const struct view *v)
+{
+    struct header h = im->hdr;
+    check(image_new(im, v->nx, v->ny));
+    im->hdr = h;
+}
+
 static void run(const struct request *r, const struct common *c, const char *record)
 {
     struct input in = {0};
@@ -292,16 +330,22 @@ static void run(const struct request *r, const struct common *c, const char *rec
     if (st == E_RANGE)
         die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
     check(st);
-    make_plan(&plan, &v, r, c, &emission);
-    otf_free(&in.otf);                 /* the plan holds its own tables: make room for the image */
+    if (!r->whole)
+        make_plan(&plan, &v, r, c, &emission);
     scene_free(&in.scene);
     table_free(&in.list);
     free(x);
-    if (!c->check) {
-        struct header h = im.hdr;
-        check(image_new(&im, v.nx, v.ny));
-        im.hdr = h;
+    if (r->whole) {
+        if (!c->check)
+            make_image(&im, &v);
+        draw_field(&v, r, c, &emission, &im);
+    }
+    otf_free(&in.otf);                 /* a plan holds its own tables: make room for the image */
+    if (!r->whole && !c->check) {
+        make_image(&im, &v);
         draw(&plan, &im, c);
+    }
+    if (!c->check) {
         const char *inputs[] = {c->argv[0], r->models ? r->models : c->argv[0], r->psf ? r->psf : c->argv[0]};
         if (image_write(&im, c->out, record, inputs, 3, &e))
             die(EXIT_RUN, "%s", e.text);
@@ -334,6 +378,7 @@ int main(int argc, char **argv)
         {"zeropoint", 'z', OPT_REAL, &r.zeropoint, -50, 100, "MAG", "AB magnitude of 1 electron/s", 0, 0},
         {"accuracy", 0, OPT_REAL, &r.accuracy.eps, 1e-12, 0.5, "EPS", "pixel error over the object's peak", 0, 0},
         {"floor", 0, OPT_REAL, &r.accuracy.floor, 0, 1e12, "E", "pixel error allowed always, electrons", 0, 0},
+        {"method", 0, OPT_CHOICE, &r.whole, 0, 0, 0, "a stamp each, or the whole field at once", "stamp|field", 0},
         {"no-pixel", 0, OPT_FLAG, &r.no_pixel, 0, 0, 0, "values at pixel centres, not integrals", 0, 0},
         {"diffusion", 0, OPT_REAL, &r.diffusion, 0, 1e3, "ARCSEC", "charge diffusion on top of the PSF, rms", 0, 0},
         {"jitter", 0, OPT_REAL, &r.jitter, 0, 1e3, "ARCSEC", "motion of the line of sight, rms per axis", 0, 0},

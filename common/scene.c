@@ -111,7 +111,7 @@ static enum object_type read_type(struct reader *r, const struct columns *c)
 /* Position and brightness, which every object has. */
 static void read_place(struct reader *r, const struct columns *c, enum scene_where where, double zeropoint, struct object *o)
 {
-    double limit = where == SCENE_SKY ? 360 : 1e7;
+    double limit = where == SCENE_SKY ? 360 : 1e30;   /* what is far outside is skipped, not refused */
     o->id = c->id ? c->id->v.i[r->row] : (int64_t)r->row + 1;
     o->x = cell(r, c->x, -limit, limit, 0);
     o->y = cell(r, c->y, where == SCENE_SKY ? -90 : -limit, where == SCENE_SKY ? 90 : limit, 0);

@@ -143,6 +143,70 @@ near "PSFFWHM of the sum" "$(card sharp_i.fits PSFFWHM)" "$(card soft_i.fits PSF
 ok "without diffusion" simage pair.txt -p sharp.fits -x 0.1 --size 61,61 --shear 0.02,0.05 --accuracy 1e-5 -o none_i.fits
 between "makes a difference, of the peak" "$(diffmax none_i.fits sharp_i.fits | awk -v p="$(stat soft_i.fits 4)" '{ print $1 / p }')" 0.02 1.5
 
+# one convolution of the whole field: another road to the same pixels, with wings that never end
+for x in 0.04 0.1 0.16; do
+    ok "stamps at $x" simage pair.txt -p soft.fits -x $x --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 -o stamps.fits
+    ok "the field at once at $x" simage pair.txt -p soft.fits -x $x --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 --method field -o whole.fits
+    near "largest difference at $x, of the peak" "$(NPIX=21000 diffmax stamps.fits whole.fits | awk -v p="$(stat stamps.fits 4)" '{ print $1 / p }')" 0 1.5e-6
+done
+for o in "--no-pixel" "-N 2 --no-pixel" "--shear-order 4"; do
+    ok "stamps $o" simage pair.txt -p soft.fits -x 0.1 --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 $o -o stamps.fits
+    ok "field $o" simage pair.txt -p soft.fits -x 0.1 --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 $o --method field -o whole.fits
+    near "largest difference, $o, of the peak" "$(NPIX=21000 diffmax stamps.fits whole.fits | awk -v p="$(stat stamps.fits 4)" '{ print $1 / p }')" 0 1.5e-6
+done
+simage scene.txt --models m.txt -p soft.fits -x 0.1 --size 200,200 --shear 0.03,0.02 --accuracy 1e-7 --floor 0.05 -o stamps.fits
+simage scene.txt --models m.txt -p soft.fits -x 0.1 --size 200,200 --shear 0.03,0.02 --accuracy 1e-7 --floor 0.05 --method field -o whole.fits
+near "150 galaxies, floor 0.05: largest difference, electrons (errors of 150 objects)" "$(NPIX=40000 diffmax stamps.fits whole.fits)" 0 0.3
+simage scene.txt --models m.txt -p soft.fits -x 0.1 --size 200,200 --shear 0.03,0.02 --accuracy 1e-7 --floor 0.05 --method field -j 2 -o whole2.fits
+same "the field: same bytes for 1 and 2 threads" whole.fits whole2.fits
+fails "--method field without a PSF" 2 simage one.txt -x 0.1 --size 5,5 --method field
+fails "--method field beyond --max-memory" 1 simage pair.txt -p soft.fits -x 0.1 --size 2000,2000 --method field --max-memory 50M -o big.fits
+
+# hard cases: everywhere, any size, any order
+cat >where.txt <<'END'
+# X_IMAGE Y_IMAGE FLUX TYPE RE
+8 8 1 star 0.1
+8.5 16 1 star 0.1
+16.5 16.5 1 star 0.1
+0.5 24 1 star 0.1
+1e9 3 1 star 0.1
+3 -1e9 1 gauss 0.1
+1e30 1e30 1 gauss 0.1
+-30 10 1 gauss 0.1
+0.5 0.5 1 gauss 0.05
+END
+simage where.txt -x 0.1 --size 40,40 -T 1 -v -o where.fits 2>v.txt && pass "objects on centres, edges, corners, borders, 1e9 and 1e30 away" || fail "positions: $(cat v.txt)"
+near "3.5 stars and a quarter of a Gaussian are inside" "$(awk -v m="$(stat where.fits 1)" 'BEGIN { print m * 1600 }')" 3.75 2e-4
+grep -q '^simage: 4 outside or dark' v.txt && pass "4 outside, counted" || fail "outside: $(grep outside v.txt)"
+ok "positions with a PSF" simage where.txt -p soft.fits -x 0.1 --size 40,40 -T 1 --accuracy 1e-5 -o where.fits
+ok "positions, whole field" simage where.txt -p soft.fits -x 0.1 --size 40,40 -T 1 --accuracy 1e-5 --method field -o whole.fits
+near "stamps and field at borders, of a star's peak" "$(NPIX=1600 diffmax where.fits whole.fits | awk -v p="$(stat where.fits 4)" '{ print $1 / p }')" 0 3e-5
+# magnitudes 0 and 40 side by side
+printf '# DX DY MAG TYPE\n-1 0 0 star\n1 0 40 star\n' >mags.txt
+ok "magnitudes 0 and 40" simage mags.txt -x 0.1 --size 41,41 -T 1 -o mags.fits
+near "their flux, over that of magnitude 0" "$(awk -v m="$(stat mags.fits 1)" 'BEGIN { print m * 1681 / exp(0.4 * 26.65 * log(10)) }')" 1 1e-6
+printf '# DX DY MAG TYPE\n1 0 40 star\n' >faint.txt
+simage faint.txt -x 0.1 --size 41,41 -T 1 -o faint.fits
+near "the faint one: 10^(-0.4 13.35) electrons" "$(stat faint.fits 4)" 4.5709e-6 1e-10
+# larger than the image: a Gaussian of RE 50" on 4" has the surface brightness of its middle
+printf '# DX DY FLUX TYPE RE\n0 0 1 gauss 50\n' >wide.txt
+for p in "" "-p soft.fits"; do
+    ok "larger than the image${p:+, PSF}" simage wide.txt $p -x 0.1 --size 40,40 -T 1e6 --accuracy 1e-6 -o wide.fits
+done
+simage wide.txt -x 0.1 --size 40,40 -T 1e6 --accuracy 1e-6 -o w0.fits
+near "its peak pixel" "$(stat w0.fits 4)" "$(awk 'BEGIN { s = 2500 / (2 * log(2)); printf "%.9f", 1e4 / (2 * atan2(0, -1) * s) }')" 1e-5
+near "with a PSF, whose wings beyond 50\" hold 3e-4" "$(stat wide.fits 4)" "$(stat w0.fits 4)" 4e-4
+# a shear of .9999 and its undoing, zeros of both signs, the smallest number
+printf '# DX DY FLUX TYPE RE G1 G2\n0 0 1000 gauss 0.3 0.9999 0\n' >strong.txt
+printf '# DX DY FLUX TYPE RE\n0 0 1000 gauss 0.3\n' >round.txt
+simage round.txt -x 0.1 --size 61,61 -T 1 --accuracy 1e-9 -o plain.fits
+simage strong.txt -x 0.1 --size 61,61 -T 1 --accuracy 1e-9 --shear -0.9999,0 -o undone.fits
+near "g = .9999 undone, of the peak" "$(diffmax plain.fits undone.fits | awk -v p="$(stat plain.fits 4)" '{ print $1 / p }')" 0 3e-7
+for g in 0,0 -0,-0 5e-324,0 0,5e-324; do
+    simage round.txt -x 0.1 --size 61,61 -T 1 --accuracy 1e-9 --shear $g -o zero.fits
+    near "g = $g changes nothing" "$(diffmax plain.fits zero.fits)" 0 0
+done
+
 # the independent renderer's truth: shapelets with an exact shear, PSF given as samples
 T=$SHARED/truth/galsim
 if [ -d "$T" ]; then

@@ -1,0 +1,202 @@
+/* field.c - a whole scene in one convolution. */
+#include "field.h"
+#include "fft.h"
+#include "render.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define ALIAS 21.0             /* aliases below exp(-21) = 8e-10 of what they are added to */
+#define CUT 28.0               /* the Gaussian ends at exp(-28) = 7e-13 */
+#define BLOCK 64               /* rows of frequencies tabulated at a time */
+
+int field_plan(struct field *f, const struct view *v, double margin)
+{
+    const double u = v->psf ? v->psf->ucut : 0;
+    if (!(u > 0) || !(v->pixel > 0) || !(margin >= 0) || v->nx < 1 || v->ny < 1)
+        return E_RANGE;
+    struct field g = {.split = (int)ceil(3 * u * v->pixel)};    /* 1.5 times the Nyquist rate or more */
+    const double fine = v->pixel / g.split, rate = 1 / fine;
+    const double pad = margin / v->pixel;
+    const double nx = (double)v->nx + pad, ny = (double)v->ny + pad;
+    if (!(fmax(nx, ny) * 1.1 * g.split < 32768))
+        return E_RANGE;
+    g.nx = fft_good_size((int)ceil(nx));
+    g.ny = fft_good_size((int)ceil(ny));
+    g.x0 = (int)((g.nx - v->nx) / 2);
+    g.y0 = (int)((g.ny - v->ny) / 2);
+    g.sigma = sqrt(ALIAS / (2 * M_PI * M_PI * rate * (rate - 2 * u)));
+    g.bytes = 17.0 * g.split * g.split * g.nx * g.ny + 16.0 * g.nx * g.ny;
+    *f = g;
+    return OK;
+}
+
+/* A transfer function of 1, that of a single sample, for objects that only the Gaussian blurs. */
+static int flat(struct otf *t, double ucut)
+{
+    const double one = 1;
+    return otf_sample(t, 1, 1, &one, 0.25 / ucut, 0, 0, ucut);
+}
+
+/* The objects, blurred, as samples times area on the fine grid. */
+static int blurred(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
+                   struct image *fine, int threads, struct progress *bar, size_t *n_bad)
+{
+    struct otf one = {0};
+    struct plan p = {0};
+    struct accuracy own = *a;
+    struct emitter *moved = malloc((n + 1) * sizeof *moved);
+    int st = moved ? flat(&one, sqrt(CUT / 2) / (M_PI * f->sigma)) : E_NOMEM;
+    if (st) {
+        free(moved);
+        return st;
+    }
+    for (size_t i = 0; i < n; i++) {
+        moved[i] = e[i];
+        moved[i].x = (e[i].x + f->x0) * f->split;
+        moved[i].y = (e[i].y + f->y0) * f->split;
+    }
+    struct view w = *v;
+    w.nx = (long)f->nx * f->split;
+    w.ny = (long)f->ny * f->split;
+    w.pixel = v->pixel / f->split;
+    w.no_pixel = 1;
+    w.psf = &one;
+    w.diffusion = f->sigma;
+    own.eps = fmax(0.1 * a->eps, 1e-11);
+    own.floor = 0.1 * a->floor / ((double)f->split * f->split);
+    st = scene_plan(&p, &w, &own, n, moved);
+    if (st == OK) {
+        *n_bad = p.n_bad;
+        st = image_new(fine, w.nx, w.ny);
+    }
+    if (st == OK)
+        st = scene_render(&p, fine, threads, bar);
+    plan_free(&p);
+    otf_free(&one);
+    free(moved);
+    return st;
+}
+
+/* Add value at frequency (kx >= 0, ky) and its conjugate to the half plane of the output grid. */
+static void fold(const struct field *f, int kx, int ky, double re, double im, double *out)
+{
+    const int h = f->nx / 2, x = kx % f->nx, y = (ky % f->ny + f->ny) % f->ny;
+    if (x <= h) {
+        double *to = out + 2 * ((size_t)y * ((size_t)h + 1) + (size_t)x);
+        to[0] += re;
+        to[1] += im;
+    }
+    const int cx = (f->nx - x) % f->nx, cy = (f->ny - y) % f->ny;
+    if (kx > 0 && cx <= h) {
+        double *to = out + 2 * ((size_t)cy * ((size_t)h + 1) + (size_t)cx);
+        to[0] += re;
+        to[1] -= im;
+    }
+}
+
+/* Factors of one axis: the pixel and the diffusion of the view over the Gaussian. */
+static void factors(const struct field *f, const struct view *v, int n, const double *u, double *x)
+{
+    for (int i = 0; i < n; i++)
+        x[i] = exp(2 * M_PI * M_PI * f->sigma * f->sigma * u[i] * u[i]);
+    if (v->diffusion > 0)
+        otf_diffusion(n, u, v->diffusion, x);
+    if (!v->no_pixel)
+        otf_box(n, u, v->pixel, x);
+}
+
+/* Spectrum of the fine grid times T over Gaussian, folded into out. */
+static int transfer(const struct field *f, const struct view *v, const double *spectrum, double *out)
+{
+    const int fx = f->nx * f->split, fy = f->ny * f->split;
+    const double lx = f->nx * v->pixel, ly = f->ny * v->pixel;
+    const int kx = (int)floor(v->psf->ucut * lx), ky = (int)floor(v->psf->ucut * ly), rows = 2 * ky + 1;
+    const size_t cols = (size_t)kx + 1;
+    double *u = malloc((2 * (cols + (size_t)rows) + 2 * BLOCK * cols) * sizeof *u);
+    if (!u)
+        return E_NOMEM;
+    double *uy = u + cols, *gx = uy + rows, *gy = gx + cols, *re = gy + rows, *im = re + BLOCK * cols;
+    for (int i = 0; i <= kx; i++)
+        u[i] = i / lx;
+    for (int j = 0; j < rows; j++)
+        uy[j] = (j - ky) / ly;
+    factors(f, v, kx + 1, u, gx);
+    factors(f, v, rows, uy, gy);
+    int st = OK;
+    for (int j = 0; j < rows && st == OK; j += BLOCK) {
+        const int m = rows - j < BLOCK ? rows - j : BLOCK;
+        st = otf_grid(v->psf, kx + 1, u, m, uy + j, re, im);
+        for (int r = 0; r < m && st == OK; r++) {
+            const int k = j + r - ky;
+            const double *s = spectrum + 2 * (size_t)((k + fy) % fy) * ((size_t)fx / 2 + 1);
+            for (int i = 0; i <= kx; i++) {
+                const size_t t = (size_t)r * cols + (size_t)i;
+                const double g = gx[i] * gy[j + r], a = g * re[t], b = otf_is_real(v->psf) ? 0 : g * im[t];
+                fold(f, i, k, a * s[2 * i] - b * s[2 * i + 1], a * s[2 * i + 1] + b * s[2 * i], out);
+            }
+        }
+    }
+    free(u);
+    return st;
+}
+
+/* The fine image convolved and sampled: ny x nx doubles, times nx ny. */
+static int convolve(const struct field *f, const struct view *v, struct image *fine, double **made)
+{
+    const size_t n = image_count(fine), half = 2 * (size_t)fine->ny * ((size_t)fine->nx / 2 + 1);
+    const size_t folded = 2 * (size_t)f->ny * ((size_t)f->nx / 2 + 1);
+    struct fft *forward = NULL, *back = NULL;
+    double *real = fft_alloc(n * sizeof *real), *spectrum = NULL, *sum = NULL, *out = NULL;
+    int st = real ? fft_plan_r2c(&forward, (int)fine->ny, (int)fine->nx) : E_NOMEM;
+    for (size_t i = 0; st == OK && i < n; i++)
+        real[i] = fine->pix[i];
+    image_free(fine);
+    if (st == OK && !(spectrum = fft_alloc(half * sizeof *spectrum)))
+        st = E_NOMEM;
+    if (st == OK)
+        fft_run(forward, real, spectrum);
+    fft_done(forward);
+    fft_free(real);
+    if (st == OK && !(sum = fft_alloc(folded * sizeof *sum)))
+        st = E_NOMEM;
+    if (st == OK) {
+        memset(sum, 0, folded * sizeof *sum);
+        st = transfer(f, v, spectrum, sum);
+    }
+    fft_free(spectrum);
+    if (st == OK)
+        st = fft_plan_c2r(&back, f->ny, f->nx);
+    if (st == OK && !(out = fft_alloc((size_t)f->ny * (size_t)f->nx * sizeof *out)))
+        st = E_NOMEM;
+    if (st == OK)
+        fft_run(back, sum, out);
+    fft_done(back);
+    fft_free(sum);
+    if (st)
+        fft_free(out);
+    else
+        *made = out;
+    return st;
+}
+
+int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
+                 struct image *im, int threads, struct progress *bar, size_t *n_bad)
+{
+    if (im->nx != v->nx || im->ny != v->ny)
+        return E_RANGE;
+    struct image fine = {0};
+    double *out = NULL;
+    int st = blurred(f, v, a, n, e, &fine, threads, bar, n_bad);
+    if (st == OK)
+        st = convolve(f, v, &fine, &out);
+    image_free(&fine);
+    if (st)
+        return st;
+    const double scale = 1 / ((double)f->nx * f->ny);
+    for (long y = 0; y < im->ny; y++)
+        for (long x = 0; x < im->nx; x++)
+            im->pix[y * im->nx + x] += (float)(scale * out[(size_t)(y + f->y0) * (size_t)f->nx + (size_t)(x + f->x0)]);
+    fft_free(out);
+    return OK;
+}

@@ -1,0 +1,39 @@
+/*
+ * field.h - a whole scene at once: objects blurred by a narrow Gaussian are summed on
+ * a fine grid, transformed together, multiplied by T / Gaussian, folded onto the
+ * output pixels' grid and transformed back.
+ *
+ * Wings of the PSF are those of the transfer function everywhere in the field; no stamp
+ * ends and nothing but the field, padded by its margin, repeats.  The objects' frequencies
+ * beyond the fine grid are held below 1e-9 by the Gaussian, which is divided out again.  Memory
+ * 16 bytes per fine pixel, of which there are 1.5 to 3 per telescope's Nyquist interval and axis.
+ */
+#ifndef PIXSHEAR_FIELD_H
+#define PIXSHEAR_FIELD_H
+
+#include "accuracy.h"
+#include "err.h"
+#include "image.h"
+#include "plan.h"
+#include "progress.h"
+
+struct field {
+    int split;             /* fine pixels per output pixel and axis */
+    int nx, ny;            /* output pixels of the padded field */
+    int x0, y0;            /* where the image begins in it */
+    double sigma;          /* of the Gaussian, arcsec */
+    double bytes;
+};
+
+/* Choose the grid; margin in arcsec, half of it on each side. v needs a psf. E_RANGE: fine sides above 32768. */
+MUST_CHECK int field_plan(struct field *f, const struct view *v, double margin);
+
+/*
+ * Add the scene to im (of the view's size).  Objects outside the margin are left out;
+ * *n_bad counts those that cannot be drawn.  Error: eps of an object's peak or floor as with stamps, and
+ * 2e-7 of the peak from float32. E_NOMEM, E_RANGE.
+ */
+MUST_CHECK int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n,
+                            const struct emitter *e, struct image *im, int threads, struct progress *bar, size_t *n_bad);
+
+#endif
