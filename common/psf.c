@@ -231,34 +231,31 @@ static double rings_inside(const struct rings *r, double radius)
     return sum * radius;
 }
 
-int psf_profile(const struct otf *t, double diffusion, double pixel, int n, const double *radius, double *mean)
+/* out[i] = value(rings, radius[i]) for radii up to `part` of the period. */
+static int at_radii(const struct otf *t, double diffusion, double pixel, int n, const double *radius, double part,
+                    double (*value)(const struct rings *, double), double *out)
 {
     for (int i = 0; i < n; i++)
-        if (!(radius[i] >= 0 && radius[i] <= psf_period(t) / 4))
+        if (!(radius[i] >= 0 && radius[i] <= psf_period(t) * part))
             return E_RANGE;
     struct rings r;
     int status = rings_make(t, diffusion, pixel, &r);
     if (status)
         return status;
     for (int i = 0; i < n; i++)
-        mean[i] = rings_profile(&r, radius[i]);
+        out[i] = value(&r, radius[i]);
     rings_free(&r);
     return OK;
 }
 
+int psf_profile(const struct otf *t, double diffusion, double pixel, int n, const double *radius, double *mean)
+{
+    return at_radii(t, diffusion, pixel, n, radius, 0.25, rings_profile, mean);
+}
+
 int psf_encircled(const struct otf *t, double diffusion, double pixel, int n, const double *radius, double *inside)
 {
-    for (int i = 0; i < n; i++)
-        if (!(radius[i] >= 0 && radius[i] <= psf_period(t) / 2))
-            return E_RANGE;
-    struct rings r;
-    int status = rings_make(t, diffusion, pixel, &r);
-    if (status)
-        return status;
-    for (int i = 0; i < n; i++)
-        inside[i] = rings_inside(&r, radius[i]);
-    rings_free(&r);
-    return OK;
+    return at_radii(t, diffusion, pixel, n, radius, 0.5, rings_inside, inside);
 }
 
 /*
