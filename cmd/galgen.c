@@ -8,6 +8,7 @@
 #include "err.h"
 #include "models.h"
 #include "opt.h"
+#include "outfile.h"
 #include "par.h"
 #include "population.h"
 #include "progress.h"
@@ -74,7 +75,7 @@ static void check_options(struct params *p, const struct opt *own, const struct 
         die(EXIT_USAGE, "--mag-range does not go with --library-mags own, which keeps the library's magnitudes");
     if (!p->stars && !p->library && !p->models && !c->check)
         die(EXIT_USAGE, "where do the coefficients go? Give --models FILE (simage reads it), or --stars, or --library FILE");
-    if (p->models && strcmp(p->models, c->out) == 0)
+    if (p->models && outfile_same(p->models, c->out))
         die(EXIT_USAGE, "--models and --output cannot both be %s", strcmp(c->out, "-") ? c->out : "standard output");
     if (p->n >= 0)
         return;

@@ -76,6 +76,62 @@ static enum exposure_unit unit_of(const struct header *h)
     return UNIT_OTHER;
 }
 
+/* A number of the header: NaN when missing; a card that holds something else is an error. */
+static int number(const struct header *h, const char *label, const char *key, double *v, struct err *e)
+{
+    *v = NAN;
+    if (header_double(h, key, v) == E_DATA)
+        return err_set(e, E_DATA, "%s: %s is not a number: correct the keyword", label, key);
+    return OK;
+}
+
+/* PIXSCALE against the scale of the WCS; either may be missing. */
+static int check_scale(const struct header *h, const char *label, double *scale, struct err *e)
+{
+    struct sky *s;
+    const int wcs = sky_open(&s, h, NULL);
+    if (wcs == E_NOMEM)
+        return err_set(e, wcs, "%s: %s", label, err_text(wcs));
+    if (wcs == OK) {
+        const double found = sky_scale(s);
+        sky_close(s);
+        if (isnan(*scale))
+            *scale = found;
+        else if (!(fabs(found - *scale) <= 1e-3 * *scale))
+            return err_set(e, E_DATA, "%s: PIXSCALE %g and the WCS's %g arcsec differ: correct one", label, *scale, found);
+    }
+    if (*scale <= 0)
+        return err_set(e, E_DATA, "%s: PIXSCALE %g is not positive", label, *scale);
+    return OK;
+}
+
+int exposure_keywords(const struct header *h, const char *label, struct exposure *x, struct err *e)
+{
+    struct exposure new = *x;
+    const struct { const char *key; double *v; } want[] = {
+        {"EXPTIME", &new.exptime}, {"TOTTIME", &new.tottime}, {"MAGZERO", &new.magzero},
+        {"PIXSCALE", &new.scale}, {"GAIN", &new.gain},
+    };
+    int st = OK;
+    for (size_t i = 0; i < sizeof want / sizeof *want && st == OK; i++)
+        st = number(h, label, want[i].key, want[i].v, e);
+    if (st)
+        return st;
+    new.unit = unit_of(h);
+    if (isnan(new.tottime))
+        new.tottime = new.exptime;
+    if (header_long(h, "EXPNUM", &new.expnum))
+        new.expnum = -1;
+    if (new.exptime <= 0 || new.tottime <= 0)
+        return err_set(e, E_DATA, "%s: EXPTIME or TOTTIME is not positive", label);
+    if (new.gain <= 0)
+        return err_set(e, E_DATA, "%s: GAIN %g is not positive: correct the keyword", label, new.gain);
+    st = check_scale(h, label, &new.scale, e);
+    if (st == OK)
+        *x = new;
+    return st;
+}
+
 int exposure_read(struct fits_in *f, const char *name, int index, struct exposure *x, struct err *e)
 {
     const struct hdu *hdu = fits_in_hdu(f, index);
@@ -83,31 +139,8 @@ int exposure_read(struct fits_in *f, const char *name, int index, struct exposur
     char label[400];
     exposure_label(f, name, index, label, sizeof label);
     int st = fits_in_header(f, index, &new.hdr, e);
-    if (st)
-        return st;
-    new.unit = unit_of(&new.hdr);
-    new.exptime = header_double_or(&new.hdr, "EXPTIME", NAN);
-    new.tottime = header_double_or(&new.hdr, "TOTTIME", new.exptime);
-    new.magzero = header_double_or(&new.hdr, "MAGZERO", NAN);
-    new.scale = header_double_or(&new.hdr, "PIXSCALE", NAN);
-    if (header_long(&new.hdr, "EXPNUM", &new.expnum))
-        new.expnum = -1;
-    struct sky *s;
-    int wcs = st == OK ? sky_open(&s, &new.hdr, NULL) : E_MISSING;
-    if (wcs == E_NOMEM)
-        st = err_set(e, wcs, "%s: %s", label, err_text(wcs));
-    if (wcs == OK) {
-        double scale = sky_scale(s);
-        sky_close(s);
-        if (isnan(new.scale))
-            new.scale = scale;
-        else if (!(fabs(scale - new.scale) <= 1e-3 * new.scale))
-            st = err_set(e, E_DATA, "%s: PIXSCALE %g and the WCS's %g arcsec differ: correct one", label, new.scale, scale);
-    }
-    if (st == OK && (new.exptime <= 0 || new.tottime <= 0))
-        st = err_set(e, E_DATA, "%s: EXPTIME or TOTTIME is not positive", label);
-    if (st == OK && new.scale <= 0)
-        st = err_set(e, E_DATA, "%s: PIXSCALE %g is not positive", label, new.scale);
+    if (st == OK)
+        st = exposure_keywords(&new.hdr, label, &new, e);
     if (st)
         header_free(&new.hdr);
     else

@@ -23,8 +23,17 @@ struct exposure {
     double tottime;        /* TOTTIME, s, of all exposures of the observation; else EXPTIME */
     double magzero;        /* MAGZERO of BUNIT; NaN when missing */
     double scale;          /* PIXSCALE, else of the WCS, arcsec; NaN when unknown */
+    double gain;           /* GAIN, electrons per unit; NaN when missing */
     long expnum;           /* EXPNUM, -1 when missing */
 };
+
+/*
+ * What a header says of its exposure, into the fields of x from `unit` on; the
+ * others stay.  E_DATA, and x is left alone, when a keyword that must be a
+ * number is not, a time, gain or scale is not positive, or PIXSCALE contradicts
+ * the WCS by more than 1e-3.  `label` begins the messages.
+ */
+MUST_CHECK int exposure_keywords(const struct header *h, const char *label, struct exposure *x, struct err *e);
 
 /*
  * HDU indices of the exposures of an open file: *list is allocated, *n of them.
@@ -33,8 +42,7 @@ struct exposure {
 MUST_CHECK int exposure_list(const struct fits_in *f, const char *name, int **list, size_t *n, struct err *e);
 
 /*
- * Header and keywords of one HDU.  E_DATA when PIXSCALE contradicts the WCS by
- * more than 1e-3, or when a time is not positive; x->hdr is the caller's to free.
+ * Header and keywords of one HDU, checked as above; x->hdr is the caller's to free.
  */
 MUST_CHECK int exposure_read(struct fits_in *f, const char *name, int index, struct exposure *x, struct err *e);
 

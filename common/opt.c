@@ -52,17 +52,23 @@ int opt_number(const char *text, double *value)
 }
 
 /* Whole decimal number of 64 bits. */
-static int whole(const char *text, int negative_allowed, int64_t *value)
+static int whole(const char *text, int64_t *value)
 {
-    const char *digits = text + (negative_allowed && *text == '-');
+    const char *digits = text + (*text == '-');
     if (!*digits || digits[strspn(digits, "0123456789")])
         return -1;
     errno = 0;
-    long long v = strtoll(text, NULL, 10);
-    if (errno)
+    *value = strtoll(text, NULL, 10);
+    return errno ? -1 : 0;
+}
+
+static int unsigned_whole(const char *text, uint64_t *value)
+{
+    if (!*text || text[strspn(text, "0123456789")])
         return -1;
-    *value = v;
-    return 0;
+    errno = 0;
+    *value = strtoull(text, NULL, 10);
+    return errno ? -1 : 0;
 }
 
 /* Edits (insert, delete, replace, swap neighbours) between short words, for "did you mean". */
@@ -201,7 +207,7 @@ static void take_long(const struct opt *o, const char *text)
 {
     char want[120];
     int64_t v;
-    if (whole(text, 1, &v))
+    if (whole(text, &v))
         bad_value(o, text, "not a whole number");
     if (!((double)v >= o->lo && (double)v <= o->hi)) {
         snprintf(want, sizeof want, "allowed are %.0f to %.0f", o->lo, o->hi);
@@ -252,7 +258,7 @@ static void help(const struct parser *p);
 static void take_shared(const struct parser *p, const struct opt *o, const char *text)
 {
     struct common *c = p->c;
-    int64_t v;
+    uint64_t v;
     switch (o->letter ? o->letter : o->name[0]) {
     case 'o':
         if (!*text)
@@ -260,12 +266,11 @@ static void take_shared(const struct parser *p, const struct opt *o, const char 
         c->out = text;
         break;
     case 's':
-        if (whole(text, 0, &v))
-            bad_value(o, text, "a whole number from 0 is needed");
-        c->seed = (uint64_t)v;
+        if (unsigned_whole(text, &c->seed))
+            bad_value(o, text, "a whole number from 0 to 2^64 - 1 is needed");
         break;
     case 'j':
-        if (whole(text, 0, &v) || v < 1 || v > 256)
+        if (unsigned_whole(text, &v) || v < 1 || v > 256)
             bad_value(o, text, "allowed are 1 to 256");
         c->threads = (int)v;
         break;
@@ -425,7 +430,7 @@ static void help(const struct parser *p)
     for (const struct opt *o = shared_options; o->name; o++)
         help_line(o);
     if (p->prog->examples)
-        printf("\nexamples:\n%s", p->prog->examples);
+        printf("\nexamples:\n%s%s", p->prog->examples, p->prog->examples[strlen(p->prog->examples) - 1] == '\n' ? "" : "\n");
     if (fflush(stdout) || ferror(stdout))
         die(EXIT_RUN, "standard output: %s", strerror(errno));
     exit(EXIT_DONE);

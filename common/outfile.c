@@ -516,3 +516,30 @@ void outfile_abandon(struct outfile *o)
     if (o)
         destroy(o);
 }
+
+/* The folder of a name that need not exist; 0 on success. */
+static int folder_of(const char *name, struct stat *sb)
+{
+    const char *slash = strrchr(name, '/');
+    if (!slash)
+        return stat(".", sb);
+    char *folder = strndup(name, slash == name ? 1 : (size_t)(slash - name));
+    const int st = folder ? stat(folder, sb) : -1;
+    free(folder);
+    return st;
+}
+
+int outfile_same(const char *a, const char *b)
+{
+    struct stat sa, sb;
+    if (strcmp(a, b) == 0)
+        return 1;
+    if (strcmp(a, "-") == 0 || strcmp(b, "-") == 0)
+        return 0;
+    const int has_a = stat(a, &sa) == 0, has_b = stat(b, &sb) == 0;
+    if (has_a && has_b)
+        return sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino && !S_ISCHR(sa.st_mode);
+    const char *base_a = strrchr(a, '/'), *base_b = strrchr(b, '/');
+    return !has_a && !has_b && strcmp(base_a ? base_a + 1 : a, base_b ? base_b + 1 : b) == 0 && folder_of(a, &sa) == 0 &&
+           folder_of(b, &sb) == 0 && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino;
+}

@@ -23,6 +23,12 @@ struct outfile;
 MUST_CHECK int outfile_open(struct outfile **o, const char *name, const char *const *inputs,
                             size_t n_inputs, struct err *e);
 
+/*
+ * 1 when two output names mean one file (by name, link or folder; "-" is one
+ * file with itself), also when neither exists yet.
+ */
+int outfile_same(const char *a, const char *b);
+
 /* Append n bytes, buffered. */
 MUST_CHECK int outfile_write(struct outfile *o, const void *buf, size_t n);
 

@@ -12,6 +12,8 @@
 #include "outfile.h"
 #include "source.h"
 #include <errno.h>
+#include <float.h>
+#include <math.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -827,6 +829,12 @@ static void put_padded(struct sink *k, const char *text, size_t width)
         put(k, " ", 1);
 }
 
+/* Rounded as a FITS table would hold it, so that both forms give the same number. */
+static double as_float(double v)
+{
+    return fabs(v) <= (double)FLT_MAX ? (double)(float)v : v;
+}
+
 /* A number in a cell, printed into the buffer itself. */
 static void put_number(struct sink *k, enum col_type type, const struct column *c, size_t i)
 {
@@ -834,7 +842,7 @@ static void put_number(struct sink *k, enum col_type type, const struct column *
         sink_flush(k);
     char *to = k->buf + k->n;
     k->n += type == COL_INT ? table_print_int(to, c->v.i[i])
-          : type == COL_REAL32 ? table_print_real32(to, c->v.r[i]) : table_print_real(to, c->v.r[i]);
+          : type == COL_REAL32 ? table_print_real32(to, as_float(c->v.r[i])) : table_print_real(to, c->v.r[i]);
 }
 
 static void put_names(struct sink *k, const struct table *t)

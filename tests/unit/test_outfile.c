@@ -1,5 +1,6 @@
 /* test_outfile.c - output that appears whole or not at all. */
 #include "check.h"
+#include <stdio.h>
 #include "outfile.h"
 #include <dirent.h>
 #include <fcntl.h>
@@ -220,8 +221,23 @@ static void test_limits(void)
     close(keep);
 }
 
+/* Two output names for one file. */
+static void test_same(void)
+{
+    FILE *f = fopen("same.a", "w");
+    check_that(f && fclose(f) == 0 && link("same.a", "same.b") == 0 && symlink("same.a", "same.c") == 0 && mkdir("same.d", 0755) == 0,
+               "a file, a link, a symbolic link and a folder are made");
+    check_that(outfile_same("same.a", "./same.a") && outfile_same("same.a", "same.b") && outfile_same("same.a", "same.c"),
+               "one file by name, link and symbolic link");
+    check_that(outfile_same("-", "-") && outfile_same("new", "./new") && outfile_same("same.d/../new", "new") &&
+               outfile_same("same.d/new", "./same.d/new"), "names of a file that is not there yet");
+    check_that(!outfile_same("same.a", "new") && !outfile_same("same.d/new", "new") && !outfile_same("-", "same.a") &&
+               !outfile_same("/dev/null", "same.a") && !outfile_same("nowhere/new", "new"), "names of different files");
+}
+
 int main(void)
 {
+    test_same();
     test_sizes();
     test_standard();
     test_targets();
