@@ -568,21 +568,42 @@ static void frame(struct batch *t)
     overlap_edges_make(&t->edges, x, y, factor);
 }
 
-/* Pixels lo..hi of one row, a map with a grid. */
-static void row_quads(struct job *j, struct batch *t, const struct lines *s, long y, long lo, long hi)
+/* 1 when no drop of the pixels between nodes n and n + 1 of the lines comes within `reach` of the band. */
+static int misses(const struct drizzle_band *b, const struct lines *s, long n, double reach)
 {
-    const size_t row = (size_t)(y - j->in->y0) * (size_t)j->in->nx;
-    drizzle_map_line(j->map, (double)y - 0.5 * j->pixfrac, s->X[0], s->Y[0]);
-    drizzle_map_line(j->map, (double)y + 0.5 * j->pixfrac, s->X[1], s->Y[1]);
-    for (long x = lo; x <= hi; x++) {
-        if (drop_at(j->in, row + (size_t)x, &t->drop[t->n]))
-            t->x[t->n++] = (double)x;
-        if (t->n == OVERLAP_LANES || (x == hi && t->n)) {
-            corners(j->map, j->pixfrac, s, t);
-            frame(t);
-            flush(j, t);
+    const double *p = s->Y[0] + n, *q = s->Y[1] + n;
+    return least4(p[0], p[1], q[0], q[1]) - reach > (double)(b->y0 + b->ny) || most4(p[0], p[1], q[0], q[1]) + reach < (double)b->y0;
+}
+
+static void finish(struct job *j, struct batch *t, const struct lines *s)
+{
+    if (t->n == 0)
+        return;
+    corners(j->map, j->pixfrac, s, t);
+    frame(t);
+    flush(j, t);
+}
+
+/* One row of a map with a grid, cell by cell. */
+static void row_quads(struct job *j, struct batch *t, const struct lines *s, long y, double reach)
+{
+    const struct drizzle_map *m = j->map;
+    const long nx = j->in->nx;
+    const size_t row = (size_t)(y - j->in->y0) * (size_t)nx;
+    drizzle_map_line(m, (double)y - 0.5 * j->pixfrac, s->X[0], s->Y[0]);
+    drizzle_map_line(m, (double)y + 0.5 * j->pixfrac, s->X[1], s->Y[1]);
+    for (long n = 0; n < m->gx - 1; n++) {
+        const long first = n * m->step - 1, end = first + m->step;
+        if (misses(j->band, s, n, reach))
+            continue;
+        for (long x = first < 0 ? 0 : first; x < (end < nx ? end : nx); x++) {
+            if (drop_at(j->in, row + (size_t)x, &t->drop[t->n]))
+                t->x[t->n++] = (double)x;
+            if (t->n == OVERLAP_LANES)
+                finish(j, t, s);
         }
     }
+    finish(j, t, s);
 }
 
 /* Part of [*lo, *hi] where c + m x lies in [a, b]. */
@@ -643,7 +664,7 @@ static int rows_general(struct job *j)
         if (shaped)
             row_shapes(j, shape, t, y, (long)ceil(lo), (long)hi);
         else if (square && m->node_x)
-            row_quads(j, t, &lines, y, (long)ceil(lo), (long)hi);
+            row_quads(j, t, &lines, y, reach);
         else if (square)
             row_large(j, y, (long)ceil(lo), (long)hi);
         else

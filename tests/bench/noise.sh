@@ -1,7 +1,6 @@
-# Photon noise, sky-dominated: 4096 x 4096 pixels of about 430 electrons.
-galgen --field 40.96 -n 100 --stars -o s.txt
-simage s.txt -x 0.01 --size 4096,4096 -o flat.fits
-for rate in 21.5 0.05 200; do
-    rate=$(awk "BEGIN { print $rate * 1e-2 / 1e-4 / 2000 * 10 * 2000 / 2000 }")
-    cpu "addnoise, 16.8 Mpixel, sky $rate electron/s/arcsec^2" addnoise --sky-rate "$rate" flat.fits -o noisy.fits
+# Photon noise of a blank sky: 4096 x 4096 pixels with means of 5, 72 (0.1" pixels at depth 27.7 have 284) and 430 electrons.
+printf '# DX DY MAG TYPE RE\n0 0 40 gauss 0.3\n' >dark.txt
+simage dark.txt -x 0.1 --size 4096,4096 -T 2000 -o flat.fits
+for mean in 5 72 430; do
+    cpu "addnoise, 16.8 Mpixel, mean $mean" addnoise --sky-rate "$(awk "BEGIN { print $mean / 2000 / 0.01 }")" flat.fits -o noisy.fits
 done

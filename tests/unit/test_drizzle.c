@@ -344,6 +344,42 @@ static void bent_drops(void)
     drizzle_map_free(&m);
 }
 
+/* Forty distortions, turns and drop sizes against clipping; bands of three rows give the same bytes. */
+static void bent_many(void)
+{
+    struct check c = check_begin("40 distorted maps: weights against clipping");
+    long differ = 0, failed = 0;
+    for (uint64_t n = 0; n < 40; n++) {
+        struct bend bent = {6e-3 * (uni(n, 31) - 0.5), 4e-4 * (uni(n, 32) - 0.5), 0.8 * uni(n, 33) - 0.2};
+        struct drizzle_map m;
+        const double pf = 0.3 + uni(n, 34);
+        double flux[NO * NO] = {0}, weight[NO * NO] = {0}, rf[NO * NO] = {0}, rw[NO * NO] = {0}, bf[NO * NO] = {0}, bw[NO * NO] = {0};
+        float pix[NI * NI], wht[NI * NI];
+        for (int i = 0; i < NI * NI; i++) {
+            pix[i] = (float)uni(n, 300 + (uint32_t)i);
+            wht[i] = (float)floor(3 * uni(n, 500 + (uint32_t)i));
+        }
+        if (drizzle_map_make(&m, NI, NI, bend_fn, &bent)) {
+            failed++;
+            continue;
+        }
+        struct drizzle_input in = {.nx = NI, .ny = NI, .pix = pix, .weight = wht, .w = 1, .scale = 1};
+        struct planes whole = {.nx = NO, .ny = NO, .flux = flux, .weight = weight};
+        failed += add_rows(DRIZZLE_SQUARE, pf, &m, &in, &whole) != OK;
+        for (long y = 0; y < NO; y += 3) {
+            struct planes part = {.nx = NO, .y0 = y, .ny = NO - y < 3 ? NO - y : 3, .flux = bf + y * NO, .weight = bw + y * NO};
+            failed += add_rows(DRIZZLE_SQUARE, pf, &m, &in, &part) != OK;
+        }
+        differ += memcmp(flux, bf, sizeof flux) != 0 || memcmp(weight, bw, sizeof weight) != 0;
+        reference(&m, pf, pix, wht, rf, rw);
+        for (int i = 0; i < NO * NO; i++)
+            check_close(&c, weight[i], rw[i], 2e-12);
+        drizzle_map_free(&m);
+    }
+    check_end(&c);
+    check_that(differ == 0 && failed == 0, "40 distorted maps: the same bytes from bands of three rows");
+}
+
 static void hard(void)
 {
     enum { N = 5 };
@@ -470,6 +506,7 @@ int main(void)
     bands();
     maps();
     bent_drops();
+    bent_many();
     hard();
     smooth();
     noise();
