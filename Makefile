@@ -111,6 +111,9 @@ paper: all    # the whole experiment of High et al. (2007)
 deps:    # install the compiler, the libraries and the plotter (Debian, Ubuntu)
 	@tests/deps
 
+deps-slurm:    # install a Slurm for the test of runs on clusters (Debian, Ubuntu)
+	@tests/deps slurm
+
 COMPLETION = $(DESTDIR)$(PREFIX)/share/bash-completion/completions
 
 install: all    # programs, man pages, completion under $(DESTDIR)$(PREFIX)
@@ -132,4 +135,4 @@ clean:    # remove everything that was built
 help:    # this list
 	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all layers check check-large sanitize tsan coverage lint bench accuracy quick paper deps install uninstall clean help FORCE
+.PHONY: all layers check check-large sanitize tsan coverage lint bench accuracy quick paper deps deps-slurm install uninstall clean help FORCE
