@@ -3,6 +3,7 @@
 # and with exact ones.  Full symbols g_1, open ones g_2.
 load "style.gp"
 set xrange [0.03:0.25]
+set xtics 0.08
 
 set format y "%.2f"
 shade(s) = s eq "sim1" ? "#0072b2" : s eq "sim1d" ? "#56b4e9" : s eq "sim2" ? "#d55e00" : "#e69f00"

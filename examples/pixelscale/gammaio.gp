@@ -4,6 +4,7 @@ get(v, c) = real(system(sprintf("./pick %s/fom-%s.cat sim1 CCDSCALE %s | awk '$1
 points(k) = sprintf("< awk '$1 == \"%s\" { print $2, $3, $4 }' %s/gammaio.cat", k, dir)
 set xrange [-0.065:0.065]
 set xtics 0.05
+set ytics 0.05
 set yrange [-0.085:0.085]
 set format y "%.2f"
 set key top left Left reverse samplen 1

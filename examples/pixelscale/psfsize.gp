@@ -1,4 +1,4 @@
-# FWHM of the PSF before the pixels (dashed) and of the stars as detected.
+# FWHM of the PSF before (dashed) and after the pixels (lines), and of stars as detected.
 load "style.gp"
 set xlabel theta_ccd
 set ylabel "FWHM / arcsec"
@@ -9,6 +9,7 @@ do for [t in "svg pdf png"] {
     eval(out(t, "psfsize"))
     plot own("psfsize", "sim1", "CHPSF") using 1:2 with lines lc rgb "#0072b2" dt 2 title "Sim 1, before the pixels", \
         own("psfsize", "sim2", "CHPSF") using 1:2 with lines lc rgb "#d55e00" dt 2 title "Sim 2, before the pixels", \
-        for [i=1:4] s=word(sets, i) own("psfsize", s, "EPSF EPSFERR") using 1:2:3 with yerrorlines ls i title name(s)
+        for [i=1:4] s=word(sets, i) own("psfsize", s, "EPSF") using 1:2 with lines ls i notitle, \
+        for [i=1:4] s=word(sets, i) own("psfsize", s, "STARS STARSERR") using 1:2:3 with yerrorbars ls i dt 1 title name(s)
 }
 set output
