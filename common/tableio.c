@@ -40,6 +40,12 @@ struct lines {
     struct err *e;
 };
 
+/* Rounded as a FITS table would hold it, so that both forms give the same number. */
+static double as_float(double v)
+{
+    return fabs(v) <= (double)FLT_MAX ? (double)(float)v : v;
+}
+
 /* Up to n more bytes of the input; 0 at its end, -1 on failure. */
 static ssize_t more_bytes(struct lines *s, char *to, size_t n)
 {
@@ -496,6 +502,14 @@ static int parse_word(struct rows *r, struct column *c, size_t row, const char *
     return OK;
 }
 
+static int scan_real(const char *p, size_t n, enum col_type type, double *v)
+{
+    const int st = table_scan_real(p, n, v);
+    if (st == OK && type == COL_REAL32)
+        *v = as_float(*v);
+    return st;
+}
+
 static int parse_row(struct rows *r, const char *p, const char *end)
 {
     struct table *t = r->t;
@@ -518,7 +532,7 @@ static int parse_row(struct rows *r, const char *p, const char *end)
         if (c->type == COL_TEXT)
             st = parse_word(r, c, row, p, n);
         else if (c->type != COL_INT)
-            st = table_scan_real(p, n, &c->v.r[row]);
+            st = scan_real(p, n, c->type, &c->v.r[row]);
         else if ((st = table_scan_int(p, n, &c->v.i[row])) == E_DATA)
             return cell_error(r->s, c->name, p, n, "is not a whole number");
         if (st)
@@ -827,12 +841,6 @@ static void put_padded(struct sink *k, const char *text, size_t width)
     put(k, text, n);
     for (; n < width; n++)
         put(k, " ", 1);
-}
-
-/* Rounded as a FITS table would hold it, so that both forms give the same number. */
-static double as_float(double v)
-{
-    return fabs(v) <= (double)FLT_MAX ? (double)(float)v : v;
 }
 
 /* A number in a cell, printed into the buffer itself. */

@@ -141,9 +141,7 @@ static int build(struct table *t, size_t nrow)
     for (size_t i = 0; i < nrow && !st; i++) {
         t->col[0].v.i[i] = (int64_t)(i * i) * (i % 2 ? -1 : 1);
         t->col[1].v.r[i] = i % 10 == 3 ? (double)NAN : sqrt((double)i) * 1e3;
-        char s[32];
-        snprintf(s, sizeof s, "%.9g", 20 + log1p((double)i));
-        t->col[2].v.r[i] = strtod(s, NULL);
+        t->col[2].v.r[i] = (double)(float)(20 + log1p((double)i));
         for (size_t j = 0; j < 5; j++)
             v[j] = sin((double)(i + j)) * pow(10, -(double)(i % 12));
         st = table_set_word(&t->col[3], i, i % 3 ? "star" : "shapelet") || table_ragged(t, &t->col[4], i, v, 1 + i % 5);
