@@ -8,8 +8,10 @@
 #include "detectcat.h"
 #include "header.h"
 #include "imageio.h"
+#include "ldac.h"
 #include "opt.h"
 #include "outfile.h"
+#include "progress.h"
 #include "segment.h"
 #include "sky.h"
 #include "tableio.h"
@@ -23,14 +25,15 @@ struct options {
     struct detect_params p;
     double kernel, psf_fwhm, pixscale, zeropoint, gain, saturation;
     int no_clean, weight_type;
-    const char *weight, *mask, *region, *columns;
+    const char *weight, *mask, *region, *columns, *measure;
+    int format;
     struct opt_strs checks;
-    struct opt_reals apertures;
+    struct opt_reals apertures, fractions;
 };
 
 /* The image with what its header says, options first. */
 struct frame {
-    struct image im;
+    struct image im, other;    /* other: --measure */
     float *map;                /* rms per pixel or NULL */
     double scale;              /* arcsec per pixel, 0 unknown */
     double psf_fwhm;           /* arcsec, 0 unknown */
@@ -39,8 +42,11 @@ struct frame {
     struct sky *sky;
 };
 
-static const char *const check_name[] = {"background", "rms", "filtered", "segmentation", "objects", "subtracted"};
-enum check_type { BACKGROUND, RMS, FILTERED, SEGMENTATION, OBJECTS, SUBTRACTED, CHECKS };
+static const char *const check_name[] = {"background", "rms", "filtered", "segmentation", "objects", "subtracted",
+                                         "apertures"};
+enum check_type { BACKGROUND, RMS, FILTERED, SEGMENTATION, OBJECTS, SUBTRACTED, APERTURES, CHECKS };
+
+enum format { BY_NAME, LDAC };
 
 static void run(int st, const char *what)
 {
@@ -58,7 +64,7 @@ static enum check_type check_of(const char *text, const char **file)
             return (enum check_type)i;
         }
     die(EXIT_USAGE, "--check-image %s: give TYPE=FILE with TYPE background, rms, filtered, segmentation, "
-        "objects or subtracted", text);
+        "objects, subtracted or apertures", text);
 }
 
 /* Read a second image of the same size. */
@@ -98,18 +104,20 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     struct err e;
     if (image_read(&f->im, in, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    double need = (double)image_count(&f->im) * (o->weight ? 12 : 8) + 32 * 1048576.0;
+    double need = (double)image_count(&f->im) * (8 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0)) + 32 * 1048576.0;
     if (need > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
-    const struct header *h = &f->im.hdr;
+    if (o->measure)
+        read_beside(&f->other, o->measure, &f->im, c->max_memory);
+    const struct header *h = &f->im.hdr, *flux = o->measure ? &f->other.hdr : h;
     int wcs = sky_open(&f->sky, h, &e);
     if (wcs == E_NOMEM)
         die(EXIT_RUN, "%s: %s", in, e.text);
     if (wcs)
         f->sky = NULL;
     f->scale = o->pixscale > 0 ? o->pixscale : header_double_or(h, "PIXSCALE", f->sky ? sky_scale(f->sky) : 0);
-    f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(h, "PSFFWHM", 0);
-    f->has_zeropoint = opt_given(own, c, "zeropoint") || header_double(h, "MAGZERO", &f->zeropoint) == OK;
+    f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(flux, "PSFFWHM", header_double_or(h, "PSFFWHM", 0));
+    f->has_zeropoint = opt_given(own, c, "zeropoint") || header_double(flux, "MAGZERO", &f->zeropoint) == OK;
     if (opt_given(own, c, "zeropoint"))
         f->zeropoint = o->zeropoint;
     read_maps(f, o, c);
@@ -120,13 +128,20 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
                                  const struct opt *own, const struct common *c)
 {
     struct detect_params p = o->p;
-    const struct header *h = &f->im.hdr;
+    const struct header *h = o->measure ? &f->other.hdr : &f->im.hdr;
+    p.measure = o->measure ? &f->other : NULL;
     p.threads = c->threads;
     p.clean = !o->no_clean;
     p.phot.gain = opt_given(own, c, "gain") ? o->gain : header_double_or(h, "GAIN", 0);
     p.phot.gain = p.phot.gain > 0 ? p.phot.gain : 0;
     p.phot.saturation = opt_given(own, c, "saturation") ? o->saturation : header_double_or(h, "SATURATE", INFINITY);
     p.phot.windowed = detectcat_windowed(o->columns);
+    p.phot.plain_sizes = !detectcat_sizes(o->columns);
+    if (o->fractions.n) {
+        p.phot.flux_fraction = o->fractions.v[0];
+        p.phot.nfractions = o->fractions.n - 1;
+        p.phot.fraction = o->fractions.v + 1;
+    }
     int subtracted;
     if (header_bool(h, "SKYSUB", &subtracted) == OK && subtracted)
         p.sky_removed = header_double_or(h, "SKYLEVEL", 0);
@@ -241,6 +256,38 @@ static int check_row(enum check_type type, const struct frame *f, const struct d
     return OK;
 }
 
+/* Mark the pixels that the circle or ellipse xx dx^2 + yy dy^2 + xy dx dy = 1 passes, half sides hx, hy. */
+static void draw(unsigned char *mark, long nx, long ny, double x, double y, const double form[3], double hx, double hy)
+{
+    long steps = 16 + (long)(8 * (hx + hy));
+    for (long k = 0; k < steps; k++) {
+        double t = 2 * acos(-1) * (double)k / (double)steps, c = cos(t), s = sin(t);
+        double r = 1 / sqrt(form[0] * c * c + form[1] * s * s + form[2] * c * s);
+        long u = lround(x + r * c), v = lround(y + r * s);
+        if (u >= 0 && v >= 0 && u < nx && v < ny)
+            mark[(size_t)v * (size_t)nx + (size_t)u] = 1;
+    }
+}
+
+/* Ellipses of FLUX_AUTO and the circular apertures. */
+static unsigned char *draw_apertures(const struct frame *f, const struct detect_params *p, const struct detection *d)
+{
+    unsigned char *mark = calloc(image_count(&f->im), 1);
+    if (!mark)
+        run(E_NOMEM, "check image apertures");
+    for (size_t i = 0; i < d->n; i++) {
+        const struct object *o = &d->object[i];
+        double k2 = o->kron_radius * o->kron_radius, det = (o->xx * o->yy - o->xy * o->xy) * k2;
+        draw(mark, f->im.nx, f->im.ny, o->x, o->y, (double[3]){o->yy / det, o->xx / det, -2 * o->xy / det},
+             o->kron_radius * sqrt(o->xx), o->kron_radius * sqrt(o->yy));
+        for (size_t j = 0; j < p->phot.napertures; j++) {
+            double r = 0.5 * p->phot.aperture[j];
+            draw(mark, f->im.nx, f->im.ny, o->x, o->y, (double[3]){1 / (r * r), 1 / (r * r), 0}, r, r);
+        }
+    }
+    return mark;
+}
+
 static void write_check(const char *text, const struct frame *f, const struct detect_params *p,
                         const struct detection *d, const char *record, const char *const *inputs, size_t n)
 {
@@ -257,18 +304,22 @@ static void write_check(const char *text, const struct frame *f, const struct de
     if (fits_out_open(&out, name, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     float *row = malloc((size_t)f->im.nx * sizeof *row);
+    unsigned char *mark = type == APERTURES ? draw_apertures(f, p, d) : NULL;
     int st = row ? fits_out_hdu(out, type == SEGMENTATION ? 32 : -32, f->im.nx, f->im.ny, 1, &h, &e)
                  : err_set(&e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
     if (!st && type == SEGMENTATION)
         st = fits_out_rows_int(out, f->im.ny, d->label, &e);
     for (long y = 0; y < f->im.ny && type != SEGMENTATION && !st; y++) {
         st = check_row(type, f, p, d, y, row);
+        for (long x = 0; x < f->im.nx && mark; x++)
+            row[x] = mark[(size_t)y * (size_t)f->im.nx + (size_t)x] ? (float)(10 * d->noise) : row[x];
         if (st)
             err_set(&e, st, "%s: %s", name, err_text(st));
         else
             st = fits_out_rows(out, 1, row, &e);
     }
     free(row);
+    free(mark);
     header_free(&h);
     if (st) {
         fits_out_abandon(out);
@@ -284,11 +335,14 @@ static void write_catalogue(const struct frame *f, const struct options *o, cons
 {
     struct table t = {0};
     struct err e;
-    struct detectcat dc = {o->columns, f->has_zeropoint ? f->zeropoint : 0, f->scale, f->sky, o->apertures.n};
+    struct detectcat dc = {o->columns, f->has_zeropoint ? f->zeropoint : 0, f->scale, f->sky, o->apertures.n,
+                           o->fractions.n ? o->fractions.n - 1 : 0};
     if (detectcat_fill(&t, d, &dc, &e))
         die(EXIT_RUN, "%s", e.text);
     copy_keywords(&t, f, p, d);
-    if (table_write(&t, c->out, record, inputs, n, &e))
+    size_t len = strlen(c->out);
+    int ldac = o->format == LDAC || (o->format == BY_NAME && len > 5 && strcmp(c->out + len - 5, ".ldac") == 0);
+    if (ldac ? ldac_write(&t, &f->im, c->out, record, inputs, n, &e) : table_write(&t, c->out, record, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     table_free(&t);
     if (!f->has_zeropoint && !c->quiet)
@@ -337,7 +391,12 @@ static void search(const struct frame *f, const struct program *prog, const stru
 {
     const char *in = inputs[0];
     struct detection d = {0};
-    detect_or_die(f, in, o, p, &d);
+    struct progress bar;
+    struct detect_params with_bar = *p;
+    with_bar.progress = &bar;
+    progress_begin(&bar, "detect", DETECT_STEPS, c->quiet);
+    detect_or_die(f, in, o, &with_bar, &d);
+    progress_end(&bar);
     if (c->verbose)
         fprintf(stderr, "detect: %s: sky %g, rms %g, threshold %g rms, filtered noise %.4f; %zu found, %zu cleaned\n", in,
                 d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned);
@@ -403,12 +462,16 @@ int main(int argc, char **argv)
          .help = "level of saturated pixels (default: SATURATE)"},
         {.name = "apertures", .type = OPT_REALS, .value = &o.apertures, .lo = 1e-6, .hi = 1e5, .arg = "D,...",
          .help = "diameters of circular apertures, arcsec"},
-        {.name = "flux-fraction", .type = OPT_REAL, .value = &o.p.phot.flux_fraction, .lo = 0.01, .hi = 0.99, .arg = "F",
-         .help = "part of FLUX_AUTO inside FLUX_RADIUS"},
+        {.name = "flux-fraction", .type = OPT_REALS, .value = &o.fractions, .lo = 0.001, .hi = 0.999, .arg = "F,...",
+         .help = "parts of FLUX_AUTO inside FLUX_RADIUS, FLUX_RADIUS_2, ... (default: 0.5)"},
+        {.name = "measure", .letter = 'm', .type = OPT_STR, .value = &o.measure, .arg = "FILE", .in_file = 1,
+         .help = "detect in IMAGE, measure in this one"},
+        {.name = "format", .type = OPT_CHOICE, .value = &o.format, .choices = "name|ldac", .arg = "FORMAT",
+         .help = "of the catalogue: as the name says (.fits, .ldac, else text), or FITS_LDAC"},
         {.name = "columns", .letter = 'c', .type = OPT_STR, .value = &o.columns, .arg = "LIST",
          .help = "NAME,NAME,... instead of the default columns; +NAME,... beside them"},
         {.name = "check-image", .type = OPT_STRS, .value = &o.checks, .arg = "TYPE=FILE",
-         .help = "background, rms, filtered, segmentation, objects or subtracted"},
+         .help = "background, rms, filtered, segmentation, objects, subtracted or apertures"},
         {.name = "region", .type = OPT_STR, .value = &o.region, .arg = "FILE", .in_file = 1,
          .help = "ellipses for DS9"},
         {.name = "negative", .type = OPT_FLAG, .value = &o.p.negative,
@@ -416,7 +479,7 @@ int main(int argc, char **argv)
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    const char *in = c.argv[0], *file, *inputs[3] = {in};
+    const char *in = c.argv[0], *file, *inputs[4] = {in};
     size_t n_inputs = 1;
     if (o.p.back_filter % 2 == 0)
         die(EXIT_USAGE, "--back-filter %ld: give an odd number", o.p.back_filter);
@@ -426,6 +489,8 @@ int main(int argc, char **argv)
         inputs[n_inputs++] = o.weight;
     if (o.mask)
         inputs[n_inputs++] = o.mask;
+    if (o.measure)
+        inputs[n_inputs++] = o.measure;
 
     struct frame f = {0};
     read_frame(&f, in, &o, own, &c);
@@ -445,6 +510,7 @@ int main(int argc, char **argv)
     free(f.map);
     sky_close(f.sky);
     image_free(&f.im);
+    image_free(&f.other);
     opt_free(own);
     return EXIT_DONE;
 }

@@ -662,11 +662,43 @@ static int measure(const struct segments *s, size_t c, const struct deblend_para
     return find_margins(w, out, base, p->min_area);
 }
 
+/* A component as one object straight from its runs, without a copy of its pixels. */
+static int measure_whole(const struct segments *s, size_t c, const struct deblend_params *p, int32_t *owner,
+                         struct blob_list *out)
+{
+    const struct run *first = &s->run[s->first[c]], *end = &s->run[s->first[c + 1]];
+    int st = grow(&out->blob, &out->cap, out->n + 1, sizeof *out->blob);
+    if (st)
+        return st;
+    struct blob b = {.x0 = first->x0, .y0 = first->y, .xmin = INT32_MAX, .ymin = INT32_MAX, .xmax = -1, .ymax = -1,
+                     .flags = DETECT_UNSEPARATED, .peak = -INFINITY, .threshold = p->rms_map ? INFINITY : p->threshold};
+    for (const struct run *r = first; r < end && p->rms_map; r++)
+        for (int32_t x = r->x0; x < r->x1; x++) {
+            double t = p->threshold * (double)p->rms_map[(size_t)r->y * (size_t)p->nx + (size_t)x];
+            b.threshold = t < b.threshold ? t : b.threshold;
+        }
+    for (const struct run *r = first; r < end; r++)
+        for (int32_t x = r->x0; x < r->x1; x++) {
+            size_t at = r->at + (size_t)(x - r->x0);
+            add_pixel_to(&b, x, r->y, (double)s->smooth[at], (double)s->value[at]);
+            add_moments(&b, x, r->y, (double)s->smooth[at]);
+            owner[at] = (int32_t)out->n;
+        }
+    b.margin = b.smooth_peak - b.threshold;    /* so large an object is no wing of another */
+    out->blob[out->n++] = b;
+    return OK;
+}
+
 int deblend_component(const struct segments *s, size_t c, const struct deblend_params *p,
                       struct deblend_work *w, int32_t *owner, struct blob_list *out)
 {
     if (p->levels < 1 || p->levels > 1024 || !(p->contrast >= 0))
         return E_RANGE;
+    size_t size = 0;
+    for (size_t i = s->first[c]; i < s->first[c + 1]; i++)
+        size += (size_t)(s->run[i].x1 - s->run[i].x0);
+    if (p->most && size > p->most)
+        return measure_whole(s, c, p, owner, out);
     int st = load(w, s, c);
     if (st)
         return st;

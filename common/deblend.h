@@ -36,7 +36,7 @@ struct blob {
     double margin;             /* the min_area-th brightest filtered pixel's excess over it */
 };
 
-enum { DETECT_BLENDED = 2 };
+enum { DETECT_BLENDED = 2, DETECT_UNSEPARATED = 64 };
 
 struct blob_list {
     size_t n, cap;
@@ -51,6 +51,7 @@ struct deblend_params {
     double threshold;          /* filtered level everywhere; ignored with rms_map */
     const float *rms_map;      /* or NULL; then threshold is in units of it */
     long nx;                   /* of the image, for rms_map */
+    size_t most;               /* pixels of a component that is split; larger ones get DETECT_UNSEPARATED; 0: no limit */
 };
 
 struct deblend_work;           /* scratch of one thread */

@@ -4,6 +4,7 @@
 #include "deblend.h"
 #include "grow.h"
 #include "par.h"
+#include "progress.h"
 #include "segment.h"
 #include "simd.h"
 #include <float.h>
@@ -219,7 +220,8 @@ static int separate(const struct image *im, const float *map, const struct detec
     struct deblend_params dp = {
         .levels = p->levels, .contrast = p->contrast, .min_area = p->min_area, .rms_map = map,
         .branch_area = p->min_area < BRANCH ? p->min_area : BRANCH,
-        .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx
+        .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx,
+        .most = image_count(im) / 8 > DETECT_MOST ? image_count(im) / 8 : DETECT_MOST
     };
     struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)),
                           calloc((size_t)tasks + 1, sizeof(struct blob_list))};
@@ -245,7 +247,15 @@ struct measuring {
     struct field f;
     const struct blob_list *all;
     struct detection *d;
+    struct progress *progress;
+    long steps;                /* of progress for all objects */
 };
+
+static void tick(struct progress *p, long n)
+{
+    if (p)
+        progress_tick(p, n);
+}
 
 static int measure_objects(void *ctx, long begin, long end, int worker)
 {
@@ -258,6 +268,8 @@ static int measure_objects(void *ctx, long begin, long end, int worker)
         st = photometry_measure(&t->f, &t->all->blob[i], (int32_t)i, w, &t->d->object[i],
                                 m ? t->d->aperture + (size_t)i * m : NULL);
     photometry_work_free(w);
+    long n = (long)t->all->n;
+    tick(t->progress, t->steps * end / n - t->steps * begin / n);
     return st;
 }
 
@@ -272,7 +284,16 @@ static int measure_all(const struct image *im, const float *map, const struct de
     d->aperture = malloc((all->n * (2 * phot.napertures + phot.nfractions) + 1) * sizeof *d->aperture);
     if (!d->object || !d->aperture)
         return E_NOMEM;
-    struct measuring t = {{im, &d->background, d->label, &phot}, all, d};
+    struct measuring t = {{im, &d->background, d->label, &phot, 0}, all, d, p->progress, DETECT_STEPS / 2};
+    if (p->measure) {
+        struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads};
+        int st = background_measure(&d->measured, p->measure, NULL, &bp);
+        if (st)
+            return st;
+        phot.noise = d->measured.mean_rms;
+        phot.rms_map = NULL;
+        t.f = (struct field){p->measure, &d->measured, d->label, &phot, 1};
+    }
     return par_for((long)all->n, OBJECTS, p->threads, measure_objects, &t);
 }
 
@@ -316,12 +337,14 @@ int detect_run(const struct image *im, float *rms_map, int relative, const struc
     struct segments s = {0};
     struct blob_list all = {0};
     int st = prepare(im, rms_map, relative, p, &out);
+    tick(p->progress, DETECT_STEPS / 8);
     if (!st) {
         struct segment_params sp = {out.threshold, out.noise, rms_map, p->min_area, p->negative, p->threads};
         st = segment_find(&s, im, &out.background, &out.filter, &sp);
     }
     if (!st)
         st = separate(im, rms_map, p, &s, &all, &out);
+    tick(p->progress, DETECT_STEPS * 3 / 8);
     segment_free(&s);
     if (!st && p->negative)
         out.n = all.n;
@@ -338,6 +361,7 @@ int detect_run(const struct image *im, float *rms_map, int relative, const struc
 void detection_free(struct detection *d)
 {
     background_free(&d->background);
+    background_free(&d->measured);
     smooth_free(&d->filter);
     free(d->object);
     free(d->aperture);

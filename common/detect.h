@@ -1,8 +1,10 @@
 /*
  * detect.h - from an image to measured objects: background, filter, threshold,
  * deblending, cleaning, photometry.  Linear in pixels plus detected pixels;
- * 8 bytes per pixel (image, labels), 4 more with a weight map, plus 12 to 40
- * bytes for each detected pixel while objects are being separated.
+ * 8 bytes per pixel (image, labels), 4 more with a weight map, plus 12 bytes
+ * for each detected pixel while objects are being separated and 36 for those of
+ * the component in hand.  A component larger than DETECT_MOST pixels and an
+ * eighth of the image is not split and gets the flag DETECT_UNSEPARATED.
  */
 #ifndef PIXSHEAR_DETECT_H
 #define PIXSHEAR_DETECT_H
@@ -13,6 +15,10 @@
 #include "photometry.h"
 #include "smooth.h"
 #include <stdint.h>
+
+struct progress;
+
+enum { DETECT_MOST = 1 << 20 };
 
 enum weight_type { WEIGHT_INVERSE, WEIGHT_RMS, WEIGHT_VARIANCE };
 
@@ -31,7 +37,11 @@ struct detect_params {
     int negative;
     int threads;
     struct photometry_params phot;     /* noise and rms_map are filled in */
+    const struct image *measure;       /* photometry in this image of the same size; NULL: in the same one */
+    struct progress *progress;         /* of DETECT_STEPS; or NULL */
 };
+
+enum { DETECT_STEPS = 1000 };
 
 #define DETECT_DEFAULTS { \
     .threshold = 3, .min_area = 5, .back_cell = 64, .back_filter = 3, .levels = 32, \
@@ -40,13 +50,14 @@ struct detect_params {
 
 struct detection {
     struct background background;
+    struct background measured;    /* of the image of the photometry, when it is another */
     struct smooth filter;
     double noise;              /* rms of a pixel (without a map) */
     double filtered_noise;     /* rms of the filtered image in units of the pixel's */
     double threshold;          /* in units of the pixel's rms */
     size_t n;
     struct object *object;
-    double *aperture;          /* n * 2 * napertures */
+    double *aperture;          /* n times 2 * napertures and nfractions */
     int32_t *label;            /* nx*ny; 0 or 1 + index of the object */
     size_t found, cleaned;     /* objects before cleaning, removed by it */
 };

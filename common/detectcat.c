@@ -94,6 +94,11 @@ int detectcat_windowed(const char *columns)
     return columns && (strstr(columns, "XWIN_IMAGE") || strstr(columns, "YWIN_IMAGE"));
 }
 
+int detectcat_sizes(const char *columns)
+{
+    return !columns || *columns == '+' || strstr(columns, "FWHM_IMAGE") || strstr(columns, "STAR_PROB");
+}
+
 static double magnitude(double flux, double zeropoint)
 {
     return flux > 0 ? zeropoint - 2.5 * log10(flux) : 99;
@@ -175,9 +180,9 @@ static void fill_column(struct column *col, const struct definition *def, const 
 }
 
 /* FLUX_APER, FLUXERR_APER, MAG_APER, MAGERR_APER and the same with _2, _3, ... */
-static int add_apertures(struct table *t, size_t n, int fill, const struct detection *d,
-                         const struct detectcat *c)
+static int add_apertures(struct table *t, int fill, const struct detection *d, const struct detectcat *c)
 {
+    size_t n = c->napertures, stride = 2 * n + c->nfractions;
     static const char *const stem[4] = {"FLUX_APER", "FLUXERR_APER", "MAG_APER", "MAGERR_APER"};
     static const char *const what[4] = {"Flux in a circular aperture", "Rms error of the aperture flux",
                                         "Aperture magnitude, 99 without flux", "Rms error of the magnitude"};
@@ -195,10 +200,27 @@ static int add_apertures(struct table *t, size_t n, int fill, const struct detec
                 return st;
             struct column *col = fill ? table_find(t, name) : NULL;
             for (size_t i = 0; col && i < d->n; i++) {
-                double f = d->aperture[2 * (i * n + k)], e = d->aperture[2 * (i * n + k) + 1];
+                double f = d->aperture[i * stride + 2 * k], e = d->aperture[i * stride + 2 * k + 1];
                 col->v.r[i] = j == 0 ? f : j == 1 ? e : j == 2 ? magnitude(f, c->zeropoint) : magnitude_error(f, e);
             }
         }
+    return OK;
+}
+
+/* FLUX_RADIUS_2, ... */
+static int add_radii(struct table *t, int fill, const struct detection *d, const struct detectcat *c)
+{
+    size_t stride = 2 * c->napertures + c->nfractions;
+    for (size_t k = 0; k < c->nfractions; k++) {
+        char name[64];
+        snprintf(name, sizeof name, "FLUX_RADIUS_%zu", k + 2);
+        int st = fill ? OK : table_add(t, name, COL_REAL32, "pixel", "Radius of the circle with a further fraction of FLUX_AUTO");
+        if (st)
+            return st;
+        struct column *col = fill ? table_find(t, name) : NULL;
+        for (size_t i = 0; col && i < d->n; i++)
+            col->v.r[i] = d->aperture[i * stride + 2 * c->napertures + k];
+    }
     return OK;
 }
 
@@ -250,11 +272,15 @@ int detectcat_fill(struct table *t, const struct detection *d, const struct dete
         st = add_named(t, list, c, e);
     if (st)
         return st;
-    st = add_apertures(t, c->napertures, 0, d, c);
+    st = add_apertures(t, 0, d, c);
+    if (!st)
+        st = add_radii(t, 0, d, c);
     if (!st)
         st = table_resize(t, d->n);
     if (!st)
-        st = add_apertures(t, c->napertures, 1, d, c);
+        st = add_apertures(t, 1, d, c);
+    if (!st)
+        st = add_radii(t, 1, d, c);
     for (size_t k = 0; k < t->ncol && !st; k++)
         for (size_t i = 0; i < COLUMNS; i++)
             if (all[i].how != APERTURES && strcmp(all[i].name, t->col[k].name) == 0)

@@ -16,6 +16,7 @@ struct detectcat {
     double scale;              /* arcsec per pixel; 0 unknown: no MU_MAX */
     struct sky *sky;           /* NULL: no ALPHA_J2000 and DELTA_J2000 */
     size_t napertures;         /* columns FLUX_APER, FLUX_APER_2, ... and errors and magnitudes */
+    size_t nfractions;         /* columns FLUX_RADIUS_2, ... */
 };
 
 /* Fill an empty table. E_MISSING: a column that does not exist or cannot be made; e names it. */
@@ -27,5 +28,8 @@ const char *detectcat_name(size_t i);
 
 /* 1 when the list asks for XWIN_IMAGE or YWIN_IMAGE. */
 int detectcat_windowed(const char *columns);
+
+/* 1 when FWHM_IMAGE or STAR_PROB will be there. */
+int detectcat_sizes(const char *columns);
 
 #endif

@@ -617,11 +617,37 @@ static int measure_apertures(const struct field *f, int32_t own, struct photomet
     return OK;
 }
 
+/* Sums of the unfiltered pixels of the isophote, from this image. */
+static struct blob sum_again(const struct field *f, const struct blob *blob, int32_t own)
+{
+    struct blob b = *blob;
+    b.flux = 0;
+    b.above = 0;
+    b.peak = -INFINITY;
+    for (long y = b.ymin; y <= b.ymax; y++)
+        for (long x = b.xmin; x <= b.xmax; x++) {
+            size_t at = (size_t)y * (size_t)f->im->nx + (size_t)x;
+            float v;
+            if (f->label[at] != own)
+                continue;
+            background_subtract(f->b, f->im->pix + at, y, x, 1, 0, &v);
+            b.flux += (double)v;
+            b.above += (double)v > b.threshold;
+            if ((double)v > b.peak) {
+                b.peak = (double)v;
+                b.xpeak = (int32_t)x;
+                b.ypeak = (int32_t)y;
+            }
+        }
+    return b;
+}
+
 int photometry_measure(const struct field *f, const struct blob *blob, int32_t index,
                        struct photometry_work *w, struct object *out, double *aperture)
 {
     struct object o = {0};
-    from_blob(f, blob, &o);
+    struct blob here = f->again ? sum_again(f, blob, index + 1) : *blob;
+    from_blob(f, &here, &o);
     int st = measure_auto(f, index + 1, w, &o);
     if (!st)
         st = measure_sizes(f, w, &o, aperture ? aperture + 2 * f->p->napertures : NULL);

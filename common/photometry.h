@@ -16,7 +16,7 @@
 #include "image.h"
 #include <stdint.h>
 
-/* FLAGS; DETECT_BLENDED (2) is in deblend.h. */
+/* FLAGS; DETECT_BLENDED (2) and DETECT_UNSEPARATED (64) are in deblend.h. */
 enum {
     DETECT_CROWDED = 1,        /* more than a tenth of the AUTO ellipse is neighbours or bad pixels */
     DETECT_SATURATED = 4,      /* a pixel of the isophote is at or above the saturation level */
@@ -59,6 +59,7 @@ struct field {
     const struct background *b;
     const int32_t *label;      /* nx*ny: 0 or 1 + index of the object */
     const struct photometry_params *p;
+    int again;                 /* this is not the image of the detection: isophotes are summed here */
 };
 
 struct photometry_work;        /* scratch of one thread */

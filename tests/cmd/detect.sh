@@ -120,6 +120,58 @@ near "none with NaN" "$(grep -v '^#' many.cat | grep -ci nan)" 0 0
 { head -c 2880 const.fits | sed 's/BITPIX  =                   16/BITPIX  =                  -32/'; awk 'BEGIN { for (i = 0; i < 4096; i++) printf "\177\300%c%c", 0, 0; for (i = 16384; i % 2880; i++) printf "%c", 0 }'; } >nan.fits
 fails "all NaN" 1 detect nan.fits
 grep -q "no usable pixel" cmd.err || fail "all NaN: $(cat cmd.err)"
+
+# further fractions, another image for the photometry, apertures drawn, FITS_LDAC
+detect f.fits --flux-fraction 0.5,0.2,0.8 -o fr.cat
+near "FLUX_RADIUS of 0.5 is the default's" "$(row fr.cat 40.3 50.6 FLUX_RADIUS)" "$(row f.cat 40.3 50.6 FLUX_RADIUS)" 0
+near "of 0.2, sigma 2 and the pixel" "$(row fr.cat 40.3 50.6 FLUX_RADIUS_2)" 1.36 0.06
+near "of 0.8" "$(row fr.cat 40.3 50.6 FLUX_RADIUS_3)" 3.61 0.15
+mk 160 160 '100 + 10 * n() + g(40.3, 50.6, 9000, 2) + g(120.7, 30.2, 20000, 3)' "${C[@]/MAGZERO =                 30.0/MAGZERO =                 31.0}" >other.fits
+ok "detect in one image, measure in another" detect f.fits --measure other.fits --columns +FLUX_ISO -o dual.cat
+near "the same objects" "$(grep -vc '^#' dual.cat)" 5 0
+near "at the same places" "$(row dual.cat 40.3 50.6 X_IMAGE)" "$(row f.cat 40.3 50.6 X_IMAGE)" 0
+near "AUTO flux of the other" "$(row dual.cat 40.3 50.6 FLUX_AUTO)" 8970 300
+near "isophotal flux of the other" "$(row dual.cat 40.3 50.6 FLUX_ISO)" 8800 300
+near "its zero point" "$(row dual.cat 40.3 50.6 MAG_AUTO)" 21.12 0.04
+near "its sky" "$(row dual.cat 40.3 50.6 BACKGROUND)" 100 1.5
+near "nothing where it is empty" "$(row dual.cat 130 130 FLUX_AUTO)" 0 700
+same "measured in itself: the catalogue of one image" <(grep -v '^#' f.cat) <(detect f.fits --measure f.fits | grep -v '^#')
+mk 80 160 1 >small.fits
+fails "another image of another size" 1 detect f.fits --measure small.fits
+ok "apertures drawn" detect f.fits --apertures 1.2 --check-image apertures=ap.fits -o ap.cat
+hexreal() { perl -e 'print unpack "f>", pack "H*", $ARGV[0]' "$1"; }
+near "a pixel on the circle of 6 px" "$(hexreal "$(pix ap.fits 46 51)")" 200 15
+detect f.fits -o f.ldac; detect f.fits --format ldac -o f3.fits
+same "FITS_LDAC by name and by option" <(tail -c +2881 f.ldac | tr -d '\0' | sed 's/CHECKSUM=[^/]*//g; s/f3.fits/f.ldac/g' | head -c 2000) <(tail -c +2881 f3.fits | tr -d '\0' | sed 's/CHECKSUM=[^/]*//g' | head -c 2000)
+grep -aq "EXTNAME = 'LDAC_IMHEAD'" f.ldac && grep -aq "EXTNAME = 'LDAC_OBJECTS'" f.ldac && pass "its two tables" || fail "no LDAC tables"
+if command -v fitsverify >/dev/null; then ok "fitsverify f.ldac" fitsverify -e -q f.ldac; ok "fitsverify ap.fits" fitsverify -q ap.fits; fi
+if /usr/bin/python3 -c 'import astropy' 2>/dev/null; then
+    near "astropy reads the header and the rows" "$(/usr/bin/python3 -c "
+from astropy.io import fits
+h = fits.open('f.ldac'); c = h[1].data[0][0]
+print(len(h[2].data) if len(c) and ''.join(c).startswith('SIMPLE') and 'CRVAL1' in ''.join(c) else 0)")" 5 0
+else skip "astropy is not there: FITS_LDAC is not read by others"; fi
+
+# more hard images, in float32
+F="$TOP/tests/fits.pl"
+perl "$F" make zero.fits 64 64 0
+fails "all zero" 1 detect zero.fits
+perl "$F" make flat.fits 200 200 '1e7 + (($x * 7919 + $y * 104729 + $x * $y * 31) % 7) - 3 + ($x > 95 && $x < 105 && $y > 95 && $y < 105 ? 12 : 0)'
+ok "sky 1e7" detect -q flat.fits -o flat.cat
+near "the object of 12 per pixel on it" "$(row flat.cat 101 101 FLUX_ISO 2>/dev/null; awk '!/^#/ && ($2 - 101)^2 + ($3 - 101)^2 < 2 && !n++ { print 1 }' flat.cat)" 1 0
+perl "$F" make spiral.fits 201 201 'my ($u, $v) = ($x - 100, $y - 100); my $r = sqrt($u * $u + $v * $v); my $t = atan2($v, $u); my $k = ($r / 6 - $t / 6.2831853); $k -= int($k) - ($k < 0); ($r > 4 && $r < 90 && $k < 0.4 ? 100 : 0) + (($x * 13 + $y * 7) % 5)'
+ok "one spiral component" detect -q --rms 2 -k 0 --deblend-contrast 1 --back-size 201 spiral.fits -o spiral.cat
+near "is one object" "$(grep -vc '^#' spiral.cat)" 1 0
+ok "the same with deblending" detect -q --rms 2 -k 0 --back-size 201 spiral.fits -o spiral.cat
+near "no NaN in it" "$(grep -v '^#' spiral.cat | grep -ci nan)" 0 0
+perl "$F" make islands.fits 160 160 'my $g = 3 * exp(-(($x - 80) ** 2 + ($y - 80) ** 2) / 18) * 100; my $v = 50 + (($x * 31 + $y * 17 + $x * $y) % 11) - 5 + $g; $v = 200 if $v > 200; ($x - 30) ** 2 + ($y - 30) ** 2 < 60 ? "nan" + 0 : ($x - 120) ** 2 + ($y - 40) ** 2 < 40 ? "inf" + 0 : $v' "SATURATE=                200.0"
+ok "islands of NaN and infinity, a saturated plateau" detect -q islands.fits -o islands.cat
+near "the plateau is there, flagged 4" "$(awk '/^#/ { k = split($0, h, " "); for (i = 2; i <= k; i++) c[h[i]] = i - 1; next } ($2 - 81)^2 + ($3 - 81)^2 < 2 { print int($c["FLAGS"] / 4) % 2 }' islands.cat)" 1 0
+near "no NaN there" "$(grep -v '^#' islands.cat | grep -ci nan)" 0 0
+mk 160 160 'x > 80 ? 0 : 1' >half.fits
+ok "half without weight" detect -q f.fits -w half.fits -o half.cat
+near "its objects, and none beyond" "$(awk '!/^#/ { n++; if ($2 > 82) b++ } END { print n + 100 * b }' half.cat)" 3 0
+near "no NaN among them" "$(grep -v '^#' half.cat | grep -ci nan)" 0 0
 head -c 30000 f.fits >cut.fits
 fails "truncated input" 1 detect cut.fits
 fails "missing input" 1 detect none.fits
