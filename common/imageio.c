@@ -78,12 +78,11 @@ static int by_suffix(const struct fits_in *f, const char *suffix)
     return -1;
 }
 
-static int open_parts(struct fits_in *f, const char *path, const char *suffix, double max_memory,
-                      struct err *e)
+/* f->src is open; it has the HDU `suffix`, or NULL. */
+static int open_parts(struct fits_in *f, const char *suffix, double max_memory, struct err *e)
 {
-    int st = source_open(&f->src, path, max_memory, e);
-    if (st == OK)
-        st = fits_walk(f->src, &f->unit, &f->n, e);
+    const char *path = source_name(f->src);
+    int st = fits_walk(f->src, &f->unit, &f->n, e);
     if (st)
         return st;
     f->max_memory = max_memory;
@@ -112,9 +111,29 @@ int fits_in_open(struct fits_in **out, const char *name, double max_memory, stru
     if (st)
         return err_set(e, st, "%s: %s", name, err_text(st));
     struct fits_in *f = calloc(1, sizeof *f);
-    st = f ? open_parts(f, path, suffix, max_memory, e) : err_set(e, E_NOMEM, "%s: out of memory", name);
+    st = f ? source_open(&f->src, path, max_memory, e) : err_set(e, E_NOMEM, "%s: out of memory", name);
+    if (st == OK)
+        st = open_parts(f, suffix, max_memory, e);
     free(path);
     free(suffix);
+    if (st)
+        fits_in_close(f);
+    else
+        *out = f;
+    return st;
+}
+
+int fits_in_from(struct fits_in **out, struct source *src, double max_memory, struct err *e)
+{
+    *out = NULL;
+    struct fits_in *f = calloc(1, sizeof *f);
+    if (!f) {
+        err_set(e, E_NOMEM, "%s: out of memory", source_name(src));
+        source_close(src);
+        return E_NOMEM;
+    }
+    f->src = src;
+    int st = open_parts(f, NULL, max_memory, e);
     if (st)
         fits_in_close(f);
     else

@@ -36,6 +36,9 @@ struct hdu {
  * gzip).  An empty name is an error.
  */
 MUST_CHECK int fits_in_open(struct fits_in **f, const char *name, double max_memory, struct err *e);
+/* The same of an input that is open already, at its beginning; takes src over whatever happens. */
+struct source;
+MUST_CHECK int fits_in_from(struct fits_in **f, struct source *src, double max_memory, struct err *e);
 void fits_in_close(struct fits_in *f);
 
 int fits_in_count(const struct fits_in *f);                 /* number of HDUs */

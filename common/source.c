@@ -51,24 +51,26 @@ void source_close(struct source *s)
 
 /* ---- opening ---- */
 
-/* Look at the first two bytes and decide how to read on. */
-static int choose(struct source *s, const struct stat *sb, struct err *e)
+/* Look at the first two bytes and decide how to read on. head (n bytes): what was read before, or NULL. */
+static int choose(struct source *s, const struct stat *sb, const void *head, size_t n, struct err *e)
 {
-    unsigned char magic[2];
-    off_t at = S_ISREG(sb->st_mode) ? lseek(s->fd, 0, SEEK_CUR) : -1;
+    unsigned char magic[2] = {0};
+    off_t at = S_ISREG(sb->st_mode) && !head ? lseek(s->fd, 0, SEEK_CUR) : -1;
     ssize_t got;
     if (at >= 0) {
         got = file_pread(s->fd, magic, 2, (uint64_t)at);
     } else {
-        if (!(s->in = malloc(IN)))
+        if (!(s->in = malloc(n > IN ? n : IN)))
             return err_set(e, E_NOMEM, "%s: out of memory", s->name);
-        got = file_read(s->fd, s->in, 2);
+        if (head)
+            memcpy(s->in, head, n);
+        got = head ? (ssize_t)n : file_read(s->fd, s->in, 2);
         s->in_n = got > 0 ? (size_t)got : 0;
         memcpy(magic, s->in, 2);
     }
     if (got < 0)
         return err_set(e, E_IO, "%s: cannot read: %s", s->name, strerror(errno));
-    s->gzip = got == 2 && magic[0] == 0x1f && magic[1] == 0x8b;
+    s->gzip = got >= 2 && magic[0] == 0x1f && magic[1] == 0x8b;
     s->plain = at >= 0 && !s->gzip;
     if (s->plain) {
         s->start = (uint64_t)at;
@@ -85,7 +87,8 @@ static int choose(struct source *s, const struct stat *sb, struct err *e)
     return OK;
 }
 
-int source_open(struct source **out, const char *path, double max_memory, struct err *e)
+static int open_source(struct source **out, const char *path, const void *head, size_t n, double max_memory,
+                       struct err *e)
 {
     struct stat sb;
     int standard = !strcmp(path, "-"), st;
@@ -108,13 +111,23 @@ int source_open(struct source **out, const char *path, double max_memory, struct
     else if (S_ISDIR(sb.st_mode))
         st = err_set(e, E_IO, "%s: is a folder", s->name);
     else
-        st = choose(s, &sb, e);
+        st = choose(s, &sb, head, n, e);
     if (st) {
         source_close(s);
         return st;
     }
     *out = s;
     return OK;
+}
+
+int source_open(struct source **s, const char *path, double max_memory, struct err *e)
+{
+    return open_source(s, path, NULL, 0, max_memory, e);
+}
+
+int source_open_begun(struct source **s, const void *head, size_t n, double max_memory, struct err *e)
+{
+    return open_source(s, "-", head, n, max_memory, e);
 }
 
 /* ---- reading on ---- */

@@ -16,6 +16,8 @@ struct source;
  * max_memory bytes are held.  E_IO, E_NOMEM, E_DATA.
  */
 MUST_CHECK int source_open(struct source **s, const char *path, double max_memory, struct err *e);
+/* The same of a standard input whose first n bytes, `head`, have been read already. */
+MUST_CHECK int source_open_begun(struct source **s, const void *head, size_t n, double max_memory, struct err *e);
 void source_close(struct source *s);
 
 /*

@@ -735,37 +735,44 @@ static int has_suffix_only(const char *name)
     return n > 2 && name[n - 1] == ']' && strchr(name, '[') && access(name, F_OK) != 0;
 }
 
-/* A compressed file: a FITS table, or text. */
-static int read_gzip(struct lines *s, struct table *t, const char *name)
+/* An input that is FITS or gzip of anything: a FITS table, or text. */
+static int read_source(struct lines *s, struct table *t, struct source *src)
 {
-    char first = '\0';
+    unsigned char first = 0;
     uint64_t have;
-    int st = source_open(&s->gzip, name, s->max_memory, s->e);
-    if (st)
-        return st;
-    s->end = 0;
-    st = source_need(s->gzip, 1, &have, s->e);
+    int st = source_need(src, 1, &have, s->e);
     if (!st && have)
-        st = source_read(s->gzip, 0, &first, 1, s->e);
-    if (!st && first != 'S')
-        st = read_text(s, t);
-    source_close(s->gzip);
-    if (st || first != 'S')
+        st = source_read(src, 0, &first, 1, s->e);
+    if (!st && first == 'S') {
+        struct fits_in *f;
+        st = fits_in_from(&f, src, s->max_memory, s->e);
+        if (!st) {
+            st = fits_in_table(f, t, s->e);
+            fits_in_close(f);
+        }
         return st;
-    if (strcmp(name, "-") == 0 && lseek(0, 0, SEEK_SET) != 0)
-        return err_set(s->e, E_IO, "standard input: %s", strerror(errno));
-    return read_fits(t, name, s->max_memory, s->e);
+    }
+    s->gzip = src;
+    s->begin = s->end = 0;
+    s->eof = 0;
+    if (!st)
+        st = read_text(s, t);
+    source_close(src);
+    return st;
 }
 
 /* What the first bytes, which are in the buffer, announce. */
 static int read_any(struct lines *s, struct table *t, const char *name)
 {
-    int gzip = s->end >= 2 && s->buf[0] == '\x1f' && s->buf[1] == '\x8b', fits = s->end >= 1 && s->buf[0] == 'S';
+    int gzip = s->end >= 2 && s->buf[0] == '\x1f' && s->buf[1] == '\x8b', fits = s->end >= 1 && s->buf[0] == 'S', st;
+    struct source *src;
     if (!gzip && !fits)
         return read_text(s, t);
-    if (strcmp(name, "-") == 0 && lseek(0, 0, SEEK_SET) != 0)
-        return err_set(s->e, E_DATA, "standard input: a catalogue as FITS or gzip cannot come through a pipe: give its file name");
-    return gzip ? read_gzip(s, t, name) : read_fits(t, name, s->max_memory, s->e);
+    if (strcmp(name, "-") == 0 && lseek(0, -(off_t)s->end, SEEK_CUR) < 0)
+        st = source_open_begun(&src, s->buf, s->end, s->max_memory, s->e);
+    else
+        st = source_open(&src, name, s->max_memory, s->e);
+    return st ? st : read_source(s, t, src);
 }
 
 int table_read(struct table *t, const char *name, double max_memory, struct err *e)

@@ -138,16 +138,21 @@ fi
 
 # ---- compressed ----
 gzip -k m100.txt m100.fits
-for f in m100.txt.gz m100.fits.gz; do
+for f in m100.txt.gz m100.fits.gz m100.fits; do
     ok "a library $f" galgen --library $f -n 30 -o f3.txt
     same "$f gives the same galaxies" <(grep -v '^#' f3.txt) <(grep -v '^#' f2.txt)
     ok "$f from standard input" bash -c "galgen --library - -n 30 < $f > f3.txt"
     same "$f from standard input gives the same galaxies" <(grep -v '^#' f3.txt) <(grep -v '^#' f2.txt)
+    ok "$f through a pipe" bash -c "cat $f | galgen --library - -n 30 > f3.txt"
+    same "$f through a pipe gives the same galaxies" <(grep -v '^#' f3.txt) <(grep -v '^#' f2.txt)
+    ok "$f through a pipe, byte by byte" bash -c "dd bs=1 if=$f count=300000 2>/dev/null | galgen --library - -n 30 > f3.txt"
+    same "$f byte by byte gives the same galaxies" <(grep -v '^#' f3.txt) <(grep -v '^#' f2.txt)
 done
 head -c 3000 m100.txt.gz > cut.gz
 fails "gzip cut off" 1 galgen --library cut.gz -n 3
-fails "gzip through a pipe" 1 bash -c 'cat m100.txt.gz | galgen --library - -n 3'
-fails "FITS through a pipe" 1 bash -c 'cat m100.fits | galgen --library - -n 3'
+fails "gzip cut off, through a pipe" 1 bash -c 'cat cut.gz | galgen --library - -n 3'
+fails "FITS cut off, through a pipe" 1 bash -c 'head -c 9000 m100.fits | galgen --library - -n 3'
+fails "FITS through a pipe, more than --max-memory" 1 bash -c 'cat m100.fits | galgen --library - -n 3 --max-memory 20K'
 
 # ---- faults ----
 fails "no place for coefficients" 2 galgen
