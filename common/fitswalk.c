@@ -266,7 +266,7 @@ static int read_structure(const struct walk *w, struct fits_unit *u)
     u->naxis = (int)naxis;
     u->axis[0] = u->axis[1] = u->axis[2] = 1;
     for (int i = 0; i < naxis; i++) {
-        char name[16];
+        char name[24];
         snprintf(name, sizeof name, "NAXIS%d", i + 1);
         st = expect(w, u, 3 + (size_t)i, name, 0, INT64_MAX, &length);
         if (st)

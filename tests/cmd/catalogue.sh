@@ -98,6 +98,9 @@ head -c 1000000 /dev/zero | tr '\0' 'A' | sed 's/^/# /' >wide.cat
 for f in wide columns; do
     if ldd "$BIN/galgen" | grep -qE 'asan|tsan'; then skip "$f.cat in little memory: a sanitizer reserves far more"; continue; fi
     got=0
-    ( ulimit -v 120000; timeout 1 galgen --library $f.cat -n 1 -o out.txt 2>cmd.err ) || got=$?
-    near "$f.cat in little memory and time: exit status" $got 1 0
+    peak cost timeout 20 galgen --library $f.cat -n 1 -o out.txt 2>cmd.err || got=$?
+    read -r kib ms wall <cost
+    near "$f.cat: exit status" $got 1 0
+    between "$f.cat: KiB" $kib 100 65536
+    between "$f.cat: ms of the processor" $ms 0 1000
 done
