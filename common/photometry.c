@@ -78,7 +78,7 @@ static float mirrored(const struct field *f, double cx, double cy, long x, long 
     return v;
 }
 
-WIDE static int all_finite(const float *v, long n)
+WIDE static int finite_run(const float *v, long n)
 {
     int bad = 0;
     for (long i = 0; i < n; i++)
@@ -506,8 +506,8 @@ static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
     long y0 = b->ymin > 0 ? b->ymin - 1 : 0, y1 = b->ymax + 1 < ny ? b->ymax + 1 : ny - 1;
     for (long y = y0; y <= y1; y++) {
         size_t row = (size_t)y * (size_t)nx;
-        if (all_finite(f->im->pix + row + x0, x1 - x0 + 1)
-            && (!f->p->rms_map || all_finite(f->p->rms_map + row + x0, x1 - x0 + 1)))
+        if (finite_run(f->im->pix + row + x0, x1 - x0 + 1)
+            && (!f->p->rms_map || finite_run(f->p->rms_map + row + x0, x1 - x0 + 1)))
             continue;
         for (long x = x0; x <= x1; x++) {
             size_t at = row + (size_t)x;
