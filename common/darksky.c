@@ -149,7 +149,7 @@ static void settle(const float *mean, const float *smooth, long m, double pivot,
             break;
         double next = t.s / t.n, wide = t.low > 0 ? sqrt(t.low2 / t.low) : 0;
         wide = wide > least ? wide : least;
-        int done = fabs(next - centre) < 1e-3 * sigma && fabs(wide - width) < 0.02 * width;
+        int done = fabs(next - centre) < 2e-3 * sigma && fabs(wide - width) < 0.05 * width;
         centre = next;
         width = wide;
         if (done)

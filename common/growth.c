@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEAR = 3 };             /* rings on both sides of the guess */
+enum { NEAR = 2 };             /* rings on both sides of the guess */
 
 struct cut {                   /* a pixel near the circle */
     double v, dx, dy;

@@ -56,7 +56,7 @@ static void add_gauss(struct image *im, double x0, double y0, double peak, doubl
 static size_t pair(double distance, double ratio, double contrast)
 {
     struct scene c = {0};
-    struct deblend_params p = {32, contrast, 5, 5, 1, NULL, 0};
+    struct deblend_params p = {32, contrast, 5, 5, 1, NULL, 0, 0};
     if (image_new(&c.im, SIDE, SIDE))
         return 99;
     add_gauss(&c.im, 40.3, 45.8, 100, 3);
@@ -136,7 +136,7 @@ static void against_slow(void)
     struct rng g = rng_stream(3, 0, RNG_TEST);
     for (uint64_t t = 0; t < 40; t++) {
         struct scene c = {0};
-        struct deblend_params p = {t % 2 ? 32 : 8, t % 3 ? 0.005 : 0.0005, 3, 3, 1, NULL, 0};
+        struct deblend_params p = {t % 2 ? 32 : 8, t % 3 ? 0.005 : 0.0005, 3, 3, 1, NULL, 0, 0};
         if (image_new(&c.im, SIDE, SIDE))
             return;
         for (uint64_t k = 0; k < 8; k++)
@@ -180,7 +180,7 @@ static void against_slow(void)
 static void sums(void)
 {
     struct scene c = {0};
-    struct deblend_params p = {32, 0.005, 5, 5, 0.01, NULL, 0};
+    struct deblend_params p = {32, 0.005, 5, 5, 0.01, NULL, 0, 0};
     if (image_new(&c.im, SIDE, SIDE))
         return;
     add_gauss(&c.im, 30.25, 40.5, 100, 3);
@@ -244,7 +244,7 @@ static void hard_shapes(void)
     for (int kind = 0; kind < 3; kind++) {
         struct scene c = {0};
         long nx = kind == 2 ? SIDE : 700, ny = kind == 2 ? SIDE : 500;
-        struct deblend_params p = {32, 0, 1, 1, 1, NULL, 0};
+        struct deblend_params p = {32, 0, 1, 1, 1, NULL, 0, 0};
         if (image_new(&c.im, nx, ny))
             return;
         for (long y = 0; y < ny; y++)
@@ -265,9 +265,36 @@ static void hard_shapes(void)
     }
 }
 
+/* A component larger than `most` stays one object, with the sums of the whole. */
+static void too_large(void)
+{
+    struct scene c = {0}, d = {0};
+    struct deblend_params p = {32, 1, 5, 5, 1, NULL, 0, 0}, q = {32, 1e-3, 5, 5, 1, NULL, 0, 100};
+    if (image_new(&c.im, SIDE, SIDE) || image_new(&d.im, SIDE, SIDE))
+        return;
+    for (int k = 0; k < 2; k++) {
+        add_gauss(k ? &d.im : &c.im, 20, 20, 100, 3);
+        add_gauss(k ? &d.im : &c.im, 32, 22, 80, 3);
+    }
+    if (!check_that(split(&c, 1, &p) && split(&d, 1, &q) && c.list.n == 1 && d.list.n == 1, "one object both"))
+        return;
+    const struct blob *a = &c.list.blob[0], *b = &d.list.blob[0];
+    struct check t = check_begin("sums of a component that is not split, straight from its runs");
+    check_close(&t, b->flux, a->flux, 1e-9 * a->flux);
+    check_close(&t, b->s, a->s, 1e-9 * a->s);
+    check_close(&t, b->sx / b->s + b->x0, a->sx / a->s + a->x0, 1e-9);
+    check_close(&t, b->peak, a->peak, 0);
+    check_end(&t);
+    check_that(b->n == a->n && b->above == a->above && b->xpeak == a->xpeak && b->flags == DETECT_UNSEPARATED
+               && a->flags == 0, "pixels and flag");
+    done(&c);
+    done(&d);
+}
+
 int main(void)
 {
     pairs();
+    too_large();
     against_slow();
     sums();
     hard_shapes();
