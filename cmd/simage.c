@@ -245,7 +245,7 @@ static void report(const struct plan *p, const struct common *c)
     if (c->quiet)
         return;
     if (p->n_bad)
-        warn("%s: %zu objects cannot be drawn (a position or flux that is no number, or order above 66 and turned): left out",
+        warn("%s: %zu objects cannot be drawn (no number, order above 66 and turned, or no PSF and too thin to integrate): left out",
              c->argv[0], p->n_bad);
     if (p->n_short)
         warn("%s: %zu stamps end at %d pixels: wings beyond are missing", c->argv[0], p->n_short, p->acc.side_max);

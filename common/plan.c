@@ -14,6 +14,8 @@
 
 #define SIDES 34
 
+#define MAPPED_LONGEST 10.0    /* seconds for one object without a PSF; those that need more are not drawn */
+
 /* Sides of stamps: multiples of 8 or nearly, with factors 2, 3 and 5. */
 static const int side_of[SIDES] = {12, 16, 20, 24, 32, 40, 48, 64, 72, 80, 96, 120, 128, 144, 160, 180, 200,
                                    216, 240, 256, 288, 320, 360, 400, 480, 512, 600, 640, 720, 800, 1024, 1280, 1600, 2048};
@@ -267,6 +269,22 @@ static int plan_fourier(struct maker *m, const struct emitter *s, const struct l
     return 1;
 }
 
+/*
+ * Nodes, at most, that the quadrature of a sheared object without a PSF takes (shear_pixels), and
+ * CPU seconds for them.
+ */
+static double mapped_nodes(const struct emitter *s, double stretch)
+{
+    const double root = sqrt(2.0 * s->nmax + 1);
+    return 2 * (root + 10) * (root + 4) * stretch * stretch;
+}
+
+static double mapped_cost(const struct emitter *s, double nodes)
+{
+    const double orders = s->nmax + 1;
+    return 5e-6 + 1.5 * nodes * orders * (60e-9 + 0.6e-9 * orders);
+}
+
 /* Without a PSF. */
 static int plan_direct(struct maker *m, const struct emitter *s, const struct pose *q, const struct light *l,
                        struct draw *d)
@@ -283,6 +301,11 @@ static int plan_direct(struct maker *m, const struct emitter *s, const struct po
         ry = reach / l->stretch / e;
     }
     d->path = d->mapped ? PATH_MAPPED : PATH_CLOSED;
+    const double nodes = mapped_nodes(s, l->stretch);
+    if (d->mapped && !(nodes < 1e7 && mapped_cost(s, nodes) < MAPPED_LONGEST)) {
+        m->p->n_bad++;
+        return 0;
+    }
     return span(s->x, rx, v->nx, &d->x0, &d->nx) && span(s->y, ry, v->ny, &d->y0, &d->ny);
 }
 
@@ -295,8 +318,10 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     double matrix = d->matrix >= 0 ? 0.2e-9 * (double)shapelet_count(s->nmax) * orders * orders : 0;
     if (d->path == PATH_CLOSED)
         return 1e-6 + matrix + 0.25e-9 * orders * area + 10e-9 * orders * (d->nx + d->ny);
-    if (d->path == PATH_MAPPED)
-        return 5e-6 + 100e-9 * orders * area;
+    if (d->path == PATH_MAPPED) {
+        struct pose q;
+        return pose_of(&p->view, s, &q) ? 0 : mapped_cost(s, mapped_nodes(s, stretch_of(q.g)));
+    }
     if (d->path != PATH_FOURIER)
         return 1e-7;
     const struct stamp_grid *g = &p->grid[d->grid];

@@ -90,7 +90,7 @@ struct plan {
     /* for reports */
     size_t count[PATH_COUNT];
     size_t n_short;                   /* stamps that side_max cut short of the wanted accuracy */
-    size_t n_bad;                     /* objects that are not numbers, or of an order that cannot be turned */
+    size_t n_bad;                     /* objects that are not numbers, of an order that cannot be turned, or too skew for quadrature */
     double cost;                      /* predicted CPU seconds on one thread */
     double bytes;                     /* memory of tables and draws */
     size_t fft_plans;                 /* FFT plans made: 0 without a PSF */

@@ -232,8 +232,12 @@ static void column_sums(int nmax, const double *c, const double *bx, int parity,
     for (int n2 = 0; n2 <= nmax; n2++) {
         double sum = 0;
         const int first = parity == 2 ? 0 : (n2 + parity) % 2, step = parity == 2 ? 1 : 2;
-        for (int n1 = first; n1 <= nmax - n2; n1 += step)
-            sum += c[shapelet_index(n1, n2)] * bx[n1];
+        size_t i = shapelet_index(first, n2);
+        for (int n1 = first; n1 <= nmax - n2; n1 += step) {
+            const size_t n = (size_t)(n1 + n2);
+            sum += c[i] * bx[n1];
+            i += step == 1 ? n + 2 : 2 * n + 5;    /* index of n1 + step */
+        }
         v[n2] = sum;
     }
 }
@@ -287,20 +291,28 @@ struct strip {
 static int strip_integral(int nmax, double beta, const double *c, const double l[3], const struct strip *s,
                           int q, const double *node, const double *weight, int len, const double *ye, double *sum)
 {
+    const double reach = beta * (sqrt(2.0 * nmax + 2) + 10);   /* beyond, phi_n < 1e-16 */
     double bx[TOP + 1], v[TOP + 1], edge[TILE + 1], by[(TOP + 1) * TILE];
     int st = OK;
     for (int k = 0; k < s->panels * q && !st; k++) {
         const double x = s->lo + s->width * (k / q + 0.5 + 0.5 * node[k % q]);
         const double u = l[0] * x, w = 0.5 * s->width * weight[k % q] / l[2];
+        int first = 0, last = len;
         for (int j = 0; j <= len; j++)
             edge[j] = l[1] * x + l[2] * ye[j];
+        while (first < last && edge[first + 1] < -reach)
+            first++;
+        while (last > first && edge[last - 1] > reach)
+            last--;
+        if (first == last)
+            continue;
         st = shapelet_basis(nmax, beta, 1, &u, bx);
         if (!st)
-            st = shapelet_pixel(nmax, beta, len, edge, by);
+            st = shapelet_pixel(nmax, beta, last - first, edge + first, by);
         column_sums(nmax, c, bx, 2, v);
         for (int n = 0; n <= nmax; n++)
             v[n] *= w;
-        add_rows(nmax, len, v, by, sum);
+        add_rows(nmax, last - first, v, by, sum + first);
     }
     return st;
 }

@@ -196,6 +196,13 @@ done
 simage wide.txt -x 0.1 --size 40,40 -T 1e6 --accuracy 1e-6 -o w0.fits
 near "its peak pixel" "$(stat w0.fits 4)" "$(awk 'BEGIN { s = 2500 / (2 * log(2)); printf "%.9f", 1e4 / (2 * atan2(0, -1) * s) }')" 1e-5
 near "with a PSF, whose wings beyond 50\" hold 3e-4" "$(stat wide.fits 4)" "$(stat w0.fits 4)" 4e-4
+# the slow corner: order 60, beta .01 pixel, no PSF, strong shear at an angle: its flux, or left out in time
+awk 'BEGIN { printf "# ID BETA NMAX MAG COEFFS\n1 0.001 60 20"; for (n = 0; n <= 60; n++) for (k = 0; k <= n; k++) printf " %.17g", n ? 0 : 1 / (2 * sqrt(atan2(0, -1)) * 0.001); print "" }' >m60.txt
+for g in "0.3 0.2" "0.9 0.3" "0.6 0.7998"; do
+    printf '# DX DY FLUX TYPE MODEL G1 G2\n0.01 0.02 1000 shapelet 1 %s\n' "$g" >thin.txt
+    near "order 60, beta .01 pixel, g = $g: 0 for drawn or counted in less than 10 s" "$( (ulimit -t 10; simage thin.txt --models m60.txt -x 0.1 --size 100,100 -q -o thin.fits; echo $?) 2>/dev/null | tail -1)" 0 0
+    [ "$g" = "0.6 0.7998" ] || near "its flux" "$(awk -v m="$(stat thin.fits 1)" 'BEGIN { print m * 10000 / 2e6 }')" 1 1e-5
+done
 # a shear of .9999 and its undoing, zeros of both signs, the smallest number
 printf '# DX DY FLUX TYPE RE G1 G2\n0 0 1000 gauss 0.3 0.9999 0\n' >strong.txt
 printf '# DX DY FLUX TYPE RE\n0 0 1000 gauss 0.3\n' >round.txt

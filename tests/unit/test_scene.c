@@ -133,7 +133,7 @@ static void test_scene(void)
     check_that(table_set_word(&t.col[TYPE], 3, "galaxy") == OK && scene_open(&s, &t, &m, 26.5, "s", &e) == E_DATA
                && !strcmp(e.text, "s: row 4: TYPE 'galaxy' is unknown (star, shapelet, gauss or sersic)"), "refused: %s", e.text);
     table_free(&t);
-    refuse_scene(&m, DX, 0, (double)NAN, "s: row 1: DX nan is not in -1e+07..1e+07");
+    refuse_scene(&m, DX, 0, (double)NAN, "s: row 1: DX nan is not in -1e+30..1e+30");
     refuse_scene(&m, MAG, 1, (double)NAN, "s: row 2: MAG nan is not in -50..100");
     refuse_scene(&m, MODEL, 0, 8, "s: row 1: MODEL 8 is not in the shapelet catalogue");
     refuse_scene(&m, PARITY, 0, 0, "s: row 1: PARITY 0 is neither 1 nor -1");
