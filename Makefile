@@ -108,6 +108,9 @@ quick: all    # the small experiment: a few minutes, table and figures in exampl
 paper: all    # the whole experiment of High et al. (2007)
 	$(MAKE) -C examples/pixelscale paper $(if $(GALAXIES),GALAXIES=$(abspath $(GALAXIES)))
 
+calibration: all    # how good the shears are: slopes and biases with errors on 24 fields; half an hour
+	$(MAKE) -C examples/calibration
+
 deps:    # install the compiler, the libraries and the plotter (Debian, Ubuntu)
 	@tests/deps
 
@@ -131,8 +134,9 @@ uninstall:    # remove what install put there
 clean:    # remove everything that was built
 	rm -rf build bin
 	$(MAKE) -s -C examples/pixelscale clean
+	$(MAKE) -s -C examples/calibration clean
 
 help:    # this list
 	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all layers check check-large sanitize tsan coverage lint bench accuracy quick paper deps deps-slurm install uninstall clean help FORCE
+.PHONY: all layers check check-large sanitize tsan coverage lint bench accuracy quick paper calibration deps deps-slurm install uninstall clean help FORCE

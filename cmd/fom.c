@@ -198,7 +198,7 @@ int main(int argc, char **argv)
         {"match-radius", 'r', OPT_REAL, &o.radius, 1e-6, 1e4, "ARCSEC", "largest distance of common objects", NULL, 0},
         {"median", 0, OPT_FLAG, &o.median, 0, 0, NULL, "median instead of mean response", NULL, 0},
         {"fit-line", 0, OPT_FLAG, &o.fit_line, 0, 0, NULL, "correct sigma with the slopes of the fits, not of the pairs", NULL, 0},
-        {"bins", 'b', OPT_STR, &bin_text, 0, 0, "NAME:LIST", "a row for each bin of a column, SNR or DISTANCE between the edges of the list", NULL, 0},
+        {"bins", 'b', OPT_STR, &bin_text, 0, 0, "NAME:LIST", "a row for each bin of a column, SNR, SIZE or DISTANCE between the edges of the list", NULL, 0},
         {"against", 0, OPT_CHOICE, &against, 0, 0, "WHAT", "slopes against the shear, or the ellipticity of the PSF (leakage)", "shear|psf", 0},
         {"draws", 0, OPT_LONG, &o.draws, 0, 100000, "N", "bootstrap resamplings", NULL, 0},
         {"table", 't', OPT_FLAG, &text, 0, 0, NULL, "write a short aligned table for people, not a catalogue", NULL, 0},

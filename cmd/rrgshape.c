@@ -118,7 +118,8 @@ static void read_input(struct input *in, const char *image, const char *cat, con
     if (table_read(&in->cat, cat, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     in->map = (struct moments_map){.nx = in->nx, .ny = in->ny, .pix = in->pix, .pix64 = in->pix64,
-                                   .gain = header_double_or(&in->hdr, "GAIN", 0)};
+                                   .gain = header_double_or(&in->hdr, "GAIN", 0),
+                                   .noise_cor = header_double_or(&in->hdr, "NOISECOR", 1)};
     if (weight) {
         char type[72] = "";
         read_map(&in->weight, in, weight, max_memory);

@@ -106,14 +106,19 @@ static int read_keys(struct fom_image *im, const struct table *t, const char *ke
 {
     if (strcmp(key, "DISTANCE") == 0)
         return distances(im) ? err_set(e, E_NOMEM, "%s", err_text(E_NOMEM)) : OK;
-    int snr = strcmp(key, "SNR") == 0 && !table_find(t, key);
-    const struct column *c[2] = {table_find(t, snr ? "FLUX_AUTO" : key), table_find(t, snr ? "FLUXERR_AUTO" : key)};
-    for (int k = 0; k < 2; k++)
+    int own = table_find(t, key) != NULL, snr = !own && strcmp(key, "SNR") == 0, size = !own && strcmp(key, "SIZE") == 0;
+    const char *name[2] = {snr ? "FLUX_AUTO" : size ? "D_RRG" : key, snr ? "FLUXERR_AUTO" : size ? "D_RRG" : key};
+    const struct column *c[2];
+    double px = 1;
+    for (int k = 0; k < 2; k++) {
+        c[k] = table_find(t, name[k]);
         if (!c[k] || c[k]->type == COL_TEXT || c[k]->type == COL_RAGGED)
-            return err_set(e, E_MISSING, "no column of numbers %s for the bins",
-                           snr ? k ? "FLUXERR_AUTO" : "FLUX_AUTO" : key);
+            return err_set(e, E_MISSING, "no column of numbers %s for the bins", name[k]);
+    }
+    if (size && table_key_number(t, "PIXSCALE", &px) != OK)
+        return err_set(e, E_MISSING, "no keyword PIXSCALE for bins of SIZE");
     for (size_t i = 0; i < im->n; i++)
-        im->object[i].key = snr ? table_number(c[0], i) / table_number(c[1], i) : table_number(c[0], i);
+        im->object[i].key = snr ? table_number(c[0], i) / table_number(c[1], i) : table_number(c[0], i) * px;
     return OK;
 }
 

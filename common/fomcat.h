@@ -35,7 +35,7 @@ struct fom_image {
 
 /*
  * What fom needs of one catalogue; all objects listed.  key: a column of
- * numbers, or SNR (FLUX_AUTO/FLUXERR_AUTO), or DISTANCE (arcsec to the nearest
+ * numbers, or SNR (FLUX_AUTO/FLUXERR_AUTO), SIZE (D_RRG in arcsec), DISTANCE (arcsec to the nearest
  * other row of the catalogue); NULL: none.  E_MISSING: e names the column or
  * keyword.  Free with fom_image_free.
  */

@@ -404,6 +404,8 @@ int moments_measure(const struct moments_map *map, const struct moments_object *
     }
     set_moments(sum, &m);
     disc_sums(&st, st.var, m.x, m.y, m.w * M_SQRT1_2, r, 4, sum);
+    for (int k = 0; k < 25 && map->noise_cor > 0; k++)
+        sum[k] *= map->noise_cor * map->noise_cor;
     set_errors(sum, &m);
     if (!(smallest(m.m2, m.w) >= SHAPE_SINGULAR_LIMIT))
         m.flags |= SHAPE_NEARSINGULAR;

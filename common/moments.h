@@ -39,6 +39,7 @@ struct moments_map {
     const float *weight;      /* NULL: none; <= 0 or not finite: blank pixel */
     int weight_inverse;       /* weight is 1/variance; else relative to its value at the object */
     double gain;              /* electrons per unit of pix; 0: no photon noise in the errors */
+    double noise_cor;         /* noise of large areas over what independent pixels give; 0: 1 */
 };
 
 struct moments_object {
@@ -86,7 +87,8 @@ void moments_scratch_free(struct moments_scratch *s);
  * more than 1 % of the weight lost in this way flags SHAPE_CROWDED, as does
  * more than 10 % replaced.
  * Errors: cov(J_a,J_b) = sum W^2 v (t_a - J_a)(t_b - J_b)/S^2 with
- * v = sky_var (or by the weight map) + max(I,0)/gain.
+ * v = [sky_var (or by the weight map) + max(I,0)/gain] noise_cor^2: right where
+ * the noise is correlated over lengths short of w.
  * Returns OK (also for a flagged object), E_RANGE, E_NOMEM.
  */
 MUST_CHECK int moments_measure(const struct moments_map *map, const struct moments_object *obj,

@@ -59,6 +59,9 @@ near "objects of the first bin" "$(col bins.cat NPAIR1 | head -1)" 200 0
 near "both bins together" "$(fom bin? -q -o both.cat; col both.cat BPAIR1)" 1 1e-6
 ok "bins of the distance" fom a? --bins DISTANCE:0,2.9,3.1,9 -q -o dist.cat
 near "all of a grid have neighbours at 3 arcsec" "$(col dist.cat NPAIR1 | tr '\n' ' ' | tr -d ' ')" 04000 0
+for k in 0 1 2 3 4 5 6 7 8; do sed 's/P22 CUT$/P22 D_RRG/' a$k >size$k; done
+ok "bins of the size: D_RRG 0 in all" fom size? --bins SIZE:-1,1 -q -o size.cat
+near "size in one bin" "$(col size.cat NPAIR1)" 400 0
 fails "bins without edges" 2 fom a0 --bins NUMBER
 fails "bins of falling edges" 2 fom a0 --bins NUMBER:2,1
 fails "bins of an unknown column" 1 fom a0 --bins MAG:1,2

@@ -112,6 +112,10 @@ sed "s/SETNAME = 'test    '/WHTTYPE = 'IVM     '/" wht.fits >ivm.fits
 rrgshape im.fits one.cat --psf none --weight ivm.fits -o ivm.out
 # pi w^2 10 of sky and the object's own light at gain 1: 10 x 44.2 + sum W^2 I, w = 3.75
 between "1/variance: error of the flux" "$(col ivm.out SERR_RRG)" 21.0 35
+sed "s/SETNAME = 'test    '/NOISECOR=        2.4/" im.fits >cor.fits; rrgshape cor.fits one.cat --psf none -o cor.out
+near "NOISECOR 2.4: error of the flux 2.4 times as large" "$(paste <(col cor.out SERR_RRG) <(col now.out SERR_RRG) | awk '{ print $1 / $2 }')" 2.4 1e-9
+near "NOISECOR: error of Jxx likewise" "$(paste <(col cor.out JXXERR_RAW) <(col now.out JXXERR_RAW) | awk '{ print $1 / $2 }')" 2.4 1e-9
+near "NOISECOR: the moments stay" "$(col cor.out JXX_RAW)" "$(col now.out JXX_RAW)" 0
 fails "image and catalogue from one pipe" 2 rrgshape - - --psf none
 rrgshape --stars-only im.fits im.cat --check >plan.txt; near "--check of stars: one line" "$(wc -l <plan.txt)" 1 0
 fails "neither stars nor PSF" 2 rrgshape im.fits im.cat
