@@ -87,7 +87,7 @@ sanitize:    # the tests again under AddressSanitizer and UndefinedBehaviorSanit
 	    SAN='-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer'
 
 tsan:    # the tests again under ThreadSanitizer
-	$(MAKE) check BUILD=build/tsan BIN=build/tsan/bin CFLAGS='-O1 -g' SAN='-fsanitize=thread'
+	$(MAKE) check BUILD=build/tsan BIN=build/tsan/bin CFLAGS='-O2 -g' SAN='-fsanitize=thread'
 
 coverage:    # lines that the tests reach, one figure a file
 	$(MAKE) check BUILD=build/coverage BIN=build/coverage/bin CFLAGS='-O0 -g --coverage' LDFLAGS=--coverage

@@ -69,7 +69,7 @@ same "detect finds the same" <(grep -v '^# HISTORY' c1 | sed s/noisy.fits//) <(g
 
 # ---- broken ones: within a second and 64 MiB
 try() { # WHAT STATUS: bad.fz; STATUS 1: must fail cleanly, -1: or work
-    local st=0 why= kib ms wall
+    local st=0 why="" kib ms wall
     mkdir c; cp bad.fz c; (cd c && exec peak ../cost "$copy" bad.fz out.fits) >o 2>e || st=$?
     read -r kib ms wall <cost
     [ $st -eq 1 ] || { [ $st -eq 0 ] && [ $2 -lt 0 ]; } || why="exit $st"
