@@ -99,7 +99,7 @@ lint:    # man pages, shell scripts, compiler warnings as errors with gcc and cl
 bench: all    # accuracy and time of every program, against its peers where installed
 	tests/bench/run
 
-accuracy: all    # what accuracy costs in time: measured curves, table and figure
+accuracy: all $(TOOLS)    # what accuracy costs in time: measured curves, table and figure
 	$(MAKE) -C examples/accuracy
 
 quick: all    # the small experiment: a few minutes, table and figures in examples/pixelscale/quick
@@ -135,6 +135,7 @@ clean:    # remove everything that was built
 	rm -rf build bin
 	$(MAKE) -s -C examples/pixelscale clean
 	$(MAKE) -s -C examples/calibration clean
+	$(MAKE) -s -C examples/accuracy clean
 
 help:    # this list
 	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
