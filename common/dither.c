@@ -16,7 +16,7 @@ void dither_phase(int e, int factor, int *a, int *b)
     *a = *b & 1 ? factor - 1 - e % factor : e % factor;
 }
 
-void dither_row(int factor, int a, long nx, const float *h, double scale, double *work, float *out)
+void dither_row(int factor, long a, long nx, long side, const float *h, double scale, double *work, float *out)
 {
     for (long x = 0; x < nx; x++)
         work[x] = (double)h[x];
@@ -25,7 +25,6 @@ void dither_row(int factor, int a, long nx, const float *h, double scale, double
         for (long x = 0; x < nx; x++)
             work[x] += (double)row[x];
     }
-    const long side = dither_side(nx, factor);
     for (long i = 0; i < side; i++) {
         const double *cell = work + (size_t)i * (size_t)factor + a;
         double sum = cell[0];

@@ -27,9 +27,9 @@ void dither_phase(int e, int factor, int *a, int *b);
 
 /*
  * One row of an exposure: h are `factor` consecutive rows of nx small pixels,
- * out gets dither_side(nx, factor) sums multiplied by `scale`, formed in
- * double; work has nx doubles.
+ * out gets `side` sums, from small pixel a on, multiplied by `scale`, formed in
+ * double; work has nx doubles; a + side * factor <= nx.
  */
-void dither_row(int factor, int a, long nx, const float *h, double scale, double *work, float *out);
+void dither_row(int factor, long a, long nx, long side, const float *h, double scale, double *work, float *out);
 
 #endif

@@ -50,6 +50,22 @@ $F make rate.fits 9 9 1 "BUNIT   = 'electron/s'" "EXPTIME =                100.0
 dither rate.fits -o r.fits
 near "rates are added, not divided" "$($F stat r.fits 1 | cut -d' ' -f1)" 4 0
 
+# a list of offsets: exact sums at multiples of a small pixel, beyond one pixel too
+printf '# DX DY\n0 0\n1.5 0.5\n0.5 2\n' >off.txt
+ok "--offsets" dither -n 2 --offsets off.txt h.fits -o l.fits
+near "--offsets: HDUs" "$($F count l.fits)" 4 0
+near "--offsets: EXPTIME a third" "$($F card l.fits 2 EXPTIME)" 666.6666666666666 1e-9
+near "--offsets: DITHERX" "$($F card l.fits 2 DITHERX)" 1.5 0
+near "--offsets: CRPIX1" "$($F card l.fits 2 CRPIX1)" "$(awk 'BEGIN { print (10.5 - 1 - 3 - .5) / 2 + 1 }')" 1e-12
+near "--offsets: NAXIS" "$($F card l.fits 2 NAXIS1)$($F card l.fits 2 NAXIS2)" 97 0
+$F dump l.fits 2 >l.txt
+near "--offsets: pixels that differ from direct sums" "$(awk 'NR == FNR { h[$1, $2] = $3; next }
+    { x = 2 * $1 + 3; y = 2 * $2 + 1; s = (h[x, y] + h[x + 1, y] + h[x, y + 1] + h[x + 1, y + 1]) / 3; d = s - $3; if (d * d > 1e-12 * s * s) bad++ } END { print bad + 0 }' h.txt l.txt)" 0 0
+printf '# DX DY\n0 0\n0.3 0.5\n' >off.txt
+fails "an offset between small pixels" 1 dither -n 2 --offsets off.txt h.fits -o no.fits
+printf '# DX DY\n0 0\n-0.5 0.5\n' >off.txt
+fails "a negative offset" 1 dither -n 2 --offsets off.txt h.fits -o no.fits
+
 $F make small.fits 8 8 1
 fails "too few pixels" 1 dither -n 5 small.fits -o no.fits
 fails "-n 0" 2 dither -n 0 small.fits

@@ -30,7 +30,7 @@ static void sums(int n, long nx, long ny)
         int a, b;
         dither_phase(e, n, &a, &b);
         for (long j = 0; j < dither_side(ny, n); j++) {
-            dither_row(n, a, nx, h + (size_t)((n * j + b) * nx), 1, work, out);
+            dither_row(n, a, nx, dither_side(nx, n), h + (size_t)((n * j + b) * nx), 1, work, out);
             for (long i = 0; i < dither_side(nx, n); i++) {
                 long sum = 0;
                 for (int p = 0; p < n; p++)
@@ -60,7 +60,7 @@ static void integrals(void)
         int a, b;
         dither_phase(e, N, &a, &b);
         for (int j = 0; j < dither_side(NY, N); j++) {
-            dither_row(N, a, NX, h + (N * j + b) * NX, 0.25, work, out);
+            dither_row(N, a, NX, dither_side(NX, N), h + (N * j + b) * NX, 0.25, work, out);
             for (int i = 0; i < dither_side(NX, N); i++) {
                 double x = N * i + a - cx, y = N * j + b - cy;
                 check_close(&c, (double)out[i], gauss_box(x, x + N, y, y + N, s) / 4, 1.3e-7 * (double)out[i] + 1e-12);
