@@ -6,6 +6,7 @@
  */
 #include "detect.h"
 #include "detectcat.h"
+#include "exposure.h"
 #include "header.h"
 #include "imageio.h"
 #include "ldac.h"
@@ -38,6 +39,7 @@ struct frame {
     double scale;              /* arcsec per pixel, 0 unknown */
     double psf_fwhm;           /* arcsec, 0 unknown */
     double zeropoint;
+    double gain;               /* electrons per unit, 0 unknown */
     int has_zeropoint;
     struct sky *sky;
 };
@@ -98,6 +100,24 @@ static void read_maps(struct frame *f, const struct options *o, const struct com
     }
 }
 
+/* Every output has a file of its own. */
+static void check_outputs(const struct options *o, const char *out)
+{
+    const char *file, *before;
+    if (o->region && outfile_same(o->region, out))
+        die(EXIT_USAGE, "--region and --output cannot both be %s", out);
+    for (size_t i = 0; i < o->checks.n; i++) {
+        check_of(o->checks.v[i], &file);
+        if (outfile_same(file, out) || (o->region && outfile_same(file, o->region)))
+            die(EXIT_USAGE, "--check-image %s: another output has that name", o->checks.v[i]);
+        for (size_t k = 0; k < i; k++) {
+            check_of(o->checks.v[k], &before);
+            if (outfile_same(file, before))
+                die(EXIT_USAGE, "--check-image %s: another output has that name", o->checks.v[i]);
+        }
+    }
+}
+
 static void read_frame(struct frame *f, const char *in, const struct options *o, const struct opt *own,
                        const struct common *c)
 {
@@ -110,12 +130,20 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     if (o->measure)
         read_beside(&f->other, o->measure, &f->im, c->max_memory);
     const struct header *h = &f->im.hdr, *flux = o->measure ? &f->other.hdr : h;
+    struct exposure x = {0};
+    if (exposure_keywords(h, in, &x, &e))
+        die(EXIT_RUN, "%s", e.text);
     int wcs = sky_open(&f->sky, h, &e);
     if (wcs == E_NOMEM)
         die(EXIT_RUN, "%s: %s", in, e.text);
     if (wcs)
         f->sky = NULL;
-    f->scale = o->pixscale > 0 ? o->pixscale : header_double_or(h, "PIXSCALE", f->sky ? sky_scale(f->sky) : 0);
+    f->scale = o->pixscale > 0 ? o->pixscale : x.scale > 0 ? x.scale : 0;
+    if (o->measure && exposure_keywords(flux, o->measure, &x, &e))
+        die(EXIT_RUN, "%s", e.text);
+    f->gain = opt_given(own, c, "gain") ? o->gain : x.gain > 0 ? x.gain : x.unit == UNIT_ELECTRON ? 1 : 0;
+    if (!(f->gain > 0) && !opt_given(own, c, "gain") && !c->quiet)
+        warn("%s: no GAIN: errors leave out the photon noise of the objects: give --gain", in);
     f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(flux, "PSFFWHM", header_double_or(h, "PSFFWHM", 0));
     f->has_zeropoint = opt_given(own, c, "zeropoint") || header_double(flux, "MAGZERO", &f->zeropoint) == OK;
     if (opt_given(own, c, "zeropoint"))
@@ -132,8 +160,7 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
     p.measure = o->measure ? &f->other : NULL;
     p.threads = c->threads;
     p.clean = !o->no_clean;
-    p.phot.gain = opt_given(own, c, "gain") ? o->gain : header_double_or(h, "GAIN", 0);
-    p.phot.gain = p.phot.gain > 0 ? p.phot.gain : 0;
+    p.phot.gain = f->gain;
     p.phot.saturation = opt_given(own, c, "saturation") ? o->saturation : header_double_or(h, "SATURATE", INFINITY);
     p.phot.windowed = detectcat_windowed(o->columns);
     p.phot.plain_sizes = !detectcat_sizes(o->columns);
@@ -177,7 +204,7 @@ static void copy_keywords(struct table *t, const struct frame *f, const struct d
 {
     static const char *const keys[] = {"CCDSCALE", "EXPTIME", "TOTTIME", "SHEAR1", "SHEAR2", "SETNAME", "SEED",
                                        "FIELDID", "EXPNUM", "PSFFWHM", "PSFFILE", "CHDIFF", "NOISECOR", "SKYLEVEL",
-                                       "SKYSUB", "BUNIT", NULL};
+                                       "SKYSUB", NULL};
     const struct header *h = &f->im.hdr;
     int st = OK;
     if (f->scale > 0) {
@@ -471,7 +498,7 @@ int main(int argc, char **argv)
         {.name = "columns", .letter = 'c', .type = OPT_STR, .value = &o.columns, .arg = "LIST",
          .help = "NAME,NAME,... instead of the default columns; +NAME,... beside them"},
         {.name = "check-image", .type = OPT_STRS, .value = &o.checks, .arg = "TYPE=FILE",
-         .help = "background, rms, filtered, segmentation, objects, subtracted or apertures"},
+         .help = "background, rms, filtered, segmentation, objects, subtracted or apertures", .in_file = 1},
         {.name = "region", .type = OPT_STR, .value = &o.region, .arg = "FILE", .in_file = 1,
          .help = "ellipses for DS9"},
         {.name = "negative", .type = OPT_FLAG, .value = &o.p.negative,
@@ -479,12 +506,11 @@ int main(int argc, char **argv)
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    const char *in = c.argv[0], *file, *inputs[4] = {in};
+    const char *in = c.argv[0], *inputs[4] = {in};
     size_t n_inputs = 1;
     if (o.p.back_filter % 2 == 0)
         die(EXIT_USAGE, "--back-filter %ld: give an odd number", o.p.back_filter);
-    for (size_t i = 0; i < o.checks.n; i++)
-        check_of(o.checks.v[i], &file);
+    check_outputs(&o, c.out);
     if (o.weight)
         inputs[n_inputs++] = o.weight;
     if (o.mask)

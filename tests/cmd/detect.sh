@@ -179,3 +179,19 @@ fails "output is the input" 1 detect f.fits -o f.fits
 ok "--check does nothing" detect --check f.fits -o never.cat
 [ ! -e never.cat ] && pass "--check wrote no file" || fail "--check wrote never.cat"
 if [ -e /dev/full ]; then fails "full device" 1 detect f.fits -o /dev/full; fi
+
+# every output has a file of its own; header numbers are numbers; PIXSCALE agrees with the WCS
+galgen --field 20 --stars -n 16 | simage - -x 0.1 --size 200,200 | addnoise --sky-rate 10 -o one.fits
+fails "check image and catalogue of one name" 2 detect one.fits --check-image rms=d -o ./d
+fails "region and catalogue of one name" 2 detect one.fits --region d -o d
+fails "two check images of one name" 2 detect one.fits --check-image rms=z --check-image background=z -o d
+fails "check image and catalogue on standard output" 2 detect one.fits --check-image rms=-
+sed 's/^\(.*PIXSCALE= *\)0\.1 /\10.2 /' one.fits >two.fits
+fails "PIXSCALE that contradicts the WCS" 1 detect two.fits -o d
+sed "s/GAIN    =                  1.0 /GAIN    = 'one     '           /" one.fits >three.fits
+if cmp -s one.fits three.fits; then fail "GAIN was not replaced"; fi
+fails "GAIN that is no number" 1 detect three.fits -o d
+detect one.fits --check-image segmentation="$PWD/seg.fits" -o path.cat
+if grep -q "HISTORY.*$PWD" path.cat; then fail "a path in HISTORY"; else pass "no path in HISTORY"; fi
+detect one.fits -o table.fits
+if command -v fitsverify >/dev/null; then ok "fitsverify finds nothing in a table" fitsverify -q table.fits; else skip "fitsverify is not installed"; fi
