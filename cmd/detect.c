@@ -40,7 +40,7 @@ struct frame {
     double psf_fwhm;           /* arcsec, 0 unknown */
     double zeropoint;
     double gain;               /* electrons per unit, 0 unknown */
-    int has_zeropoint;
+    int has_zeropoint, has_gain;
     struct sky *sky;
 };
 
@@ -142,8 +142,7 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     if (o->measure && exposure_keywords(flux, o->measure, &x, &e))
         die(EXIT_RUN, "%s", e.text);
     f->gain = opt_given(own, c, "gain") ? o->gain : x.gain > 0 ? x.gain : x.unit == UNIT_ELECTRON ? 1 : 0;
-    if (!(f->gain > 0) && !opt_given(own, c, "gain") && !c->quiet)
-        warn("%s: no GAIN: errors leave out the photon noise of the objects: give --gain", in);
+    f->has_gain = f->gain > 0 || opt_given(own, c, "gain");
     f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(flux, "PSFFWHM", header_double_or(h, "PSFFWHM", 0));
     f->has_zeropoint = opt_given(own, c, "zeropoint") || header_double(flux, "MAGZERO", &f->zeropoint) == OK;
     if (opt_given(own, c, "zeropoint"))
@@ -372,6 +371,8 @@ static void write_catalogue(const struct frame *f, const struct options *o, cons
     if (ldac ? ldac_write(&t, &f->im, c->out, record, inputs, n, &e) : table_write(&t, c->out, record, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     table_free(&t);
+    if (!f->has_gain && !c->quiet)
+        warn("%s: no GAIN in the header: errors leave out the photon noise of objects; give --gain", inputs[0]);
     if (!f->has_zeropoint && !c->quiet)
         warn("%s: no MAGZERO in the header: magnitudes are -2.5 log10(flux); give --zeropoint", inputs[0]);
 }

@@ -233,6 +233,7 @@ static void test_same(void)
                outfile_same("same.d/new", "./same.d/new"), "names of a file that is not there yet");
     check_that(!outfile_same("same.a", "new") && !outfile_same("same.d/new", "new") && !outfile_same("-", "same.a") &&
                !outfile_same("/dev/null", "same.a") && !outfile_same("nowhere/new", "new"), "names of different files");
+    check_that(!unlink("same.a") && !unlink("same.b") && !unlink("same.c") && !rmdir("same.d"), "they are removed again");
 }
 
 int main(void)
