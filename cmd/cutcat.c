@@ -72,7 +72,9 @@ static void set_keywords(struct table *t, const struct cuts *c, const struct cut
     const struct { const char *name; double v; } key[] = {
         {"NDET", (double)n->all}, {"NSTARCUT", (double)n->stars}, {"NELLCUT", (double)n->ellipticity},
         {"NSIZECUT", (double)n->size}, {"NSNRCUT", (double)n->snr}, {"NUSED", (double)n->where}};
-    for (size_t k = 0; k < sizeof key / sizeof *key; k++)
+    double before;
+    const int again = table_key_number(t, "NUSED", &before) == OK;    /* NDET stays the detector's count */
+    for (size_t k = again ? 1 : 0; k < sizeof key / sizeof *key; k++)
         check(table_set_number(t, key[k].name, key[k].v), key[k].name);
     if (c->which == DSTAR_EACH)
         return;

@@ -189,7 +189,7 @@ int main(int argc, char **argv)
     int text = 0, against = 0;
     const struct program prog = {
         "fom", "figures of merit: number density, bias of the shear, its spread, error of the power spectrum",
-        "CATALOGUE...", 1, -1,
+        "[CATALOGUE...]", 0, -1,
         "fom sim1-*.use --reference-set sim1 --reference-scale 0.10 -o fom.cat\n"
         "fom --table sim1-0.10-*.use"};
     const struct opt own[] = {

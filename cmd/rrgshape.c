@@ -367,6 +367,10 @@ static void measure_curve(struct input *in, const struct params *p, const struct
     }
     measure_stars(&s, in, c->argv[1], p, c->threads, &own);
     check(starmom_to_table(&s, out), c->argv[1]);
+    for (size_t i = 0; i < in->cat.nkey; i++)
+        check(table_set_text(out, in->cat.key[i].name, in->cat.key[i].value), c->argv[1]);
+    for (size_t i = 0; i < in->cat.nhistory; i++)
+        check(table_history(out, in->cat.history[i]), c->argv[1]);
     copy_keywords(out, &in->hdr);
     set_psf(out, &s, own, in->scale);
     if (c->verbose)

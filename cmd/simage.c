@@ -63,6 +63,9 @@ static void check(int st)
 
 static void check_options(const struct request *r, const struct opt *own, const struct common *c)
 {
+    for (const char *p = r->set; p && *p; p++)
+        if (*p <= ' ' || *p > '~')
+            die(EXIT_USAGE, "--set '%s': one word of printable ASCII is needed, catalogues carry it", r->set);
     if (!opt_given(own, c, "pixscale"))
         die(EXIT_USAGE, "how large are the pixels? Give -x ARCSEC");
     if (!(hypot(r->shear[0], r->shear[1]) < 1))

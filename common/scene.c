@@ -33,9 +33,14 @@ static int find_columns(struct reader *r, const struct table *t, struct columns 
 {
     static const char *const place[3][2] = {{"DX", "DY"}, {"RA", "DEC"}, {"X_IMAGE", "Y_IMAGE"}};
     static const enum scene_where kind[3] = {SCENE_FIELD, SCENE_SKY, SCENE_PIXEL};
-    for (int i = 0; i < 3 && !(c->x && c->y); i++) {
-        c->x = numeric(r, t, place[i][0]);
-        c->y = numeric(r, t, place[i][1]);
+    for (int i = 0; i < 3; i++) {
+        const struct column *x = numeric(r, t, place[i][0]), *y = numeric(r, t, place[i][1]);
+        if (!x || !y)
+            continue;
+        if (c->x && !r->st)
+            r->st = err_set(r->e, E_DATA, "%s: positions in %s and in %s: keep one pair of columns", r->name, c->x->name, x->name);
+        c->x = x;
+        c->y = y;
         *where = kind[i];
     }
     c->flux = numeric(r, t, "FLUX");
@@ -56,6 +61,8 @@ static int find_columns(struct reader *r, const struct table *t, struct columns 
         return r->st;
     if (!c->x || !c->y)
         return err_set(r->e, E_MISSING, "%s: no positions: a scene list has DX DY, RA DEC or X_IMAGE Y_IMAGE", r->name);
+    if (c->flux && c->mag)
+        return err_set(r->e, E_DATA, "%s: both MAG and FLUX: keep one of the columns", r->name);
     if (!c->flux && !c->mag)
         return err_set(r->e, E_MISSING, "%s: no column MAG or FLUX", r->name);
     if (!c->type)
@@ -153,7 +160,7 @@ static void read_profile(struct reader *r, const struct columns *c, struct objec
     o->re = length(r, c->re, 1);
     if (o->type == OBJECT_SERSIC) {
         need(r, c->n, "N", type);
-        o->n = cell(r, c->n, 0.3, 8, 1);
+        o->n = cell(r, c->n, 0.5, 8, 1);
     }
     o->q = cell(r, c->q, 1e-3, 1, 1);
     o->pa = degree * cell(r, c->pa, -3600, 3600, 0);

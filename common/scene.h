@@ -36,7 +36,7 @@ struct object {
     double dilation;       /* > 0: all lengths times this, same flux (beta d, coefficients / d) */
     double g1, g2;         /* own reduced shear, |g| < 1 */
     double re;             /* arcsec, circularised half-light radius (gauss, sersic) */
-    double n;              /* Sersic index, 0.3..8 */
+    double n;              /* Sersic index, 0.5..8 */
     double q;              /* axis ratio, 0 < q <= 1 */
     double pa;             /* radians anticlockwise from +x */
 };

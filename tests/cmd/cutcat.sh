@@ -53,3 +53,14 @@ fails "missing file" 1 cutcat nothere.cat
 head -n 6 in.cat >cut.cat; printf "3 0.1 0.2 1" >>cut.cat; fails "truncated row" 1 cutcat cut.cat
 fails "output is the input" 1 cutcat in.cat -o in.cat
 fails "output is the star file" 1 cutcat in.cat --stars stars.rrg -o stars.rrg
+
+# a second run keeps the detector's count, star files keep what their catalogue knew
+psfgen --pupil-grid 64 --size 32 -o psf.fits
+galgen --field 30 --stars -n 49 | simage - -p psf.fits -x 0.1 --size 300,300 --set s | addnoise --depth 27.7 -o st.fits
+detect st.fits -o st.cat
+rrgshape --stars-only st.fits st.cat -o st.rrg
+if [ -n "$(key st.rrg AREA)" ] && [ "$(key st.rrg AREA)" = "$(key st.cat AREA)" ]; then pass "AREA travels into the star file"; else fail "AREA of the star file: $(key st.rrg AREA)"; fi
+rrgshape st.fits st.cat --psf psf.fits -o all.rrg
+cutcat all.rrg --stars st.rrg --star-prob 1 --size-factor 0 --size-floor 0 -o once.use
+cutcat once.use --stars st.rrg --snr 50 -o twice.use
+near "NDET after two runs" "$(key twice.use NDET)" "$(grep -vc '^#' all.rrg)" 0

@@ -94,7 +94,7 @@ grep '^#' few0 >none0; ok "no survivor" fom none0 -o none.cat
 near "no survivor: n_gal 0" "$(col none.cat N_GAL)" 0 0
 fom few0 few1 --table -q >few.txt; grep -q undefined few.txt && pass "undefined in the table" || fail "no undefined in $(cat few.txt)"
 sed 's/ 0.05 / nan /' a4 >nan4; ok "rows without an error" fom a0 nan4 -o nan.cat
-fails "no operand" 2 fom
+fails "no operand reads standard input, here empty" 1 fom
 fails "no such file" 1 fom a0 nothere
 grep -v SHEAR1 a0 >nog; fails "no SHEAR1" 1 fom nog
 sed 's/ P11 / P99 /' a0 >nop; fails "no response column" 1 fom nop

@@ -240,3 +240,11 @@ if [ -d "$T" ]; then
 else
     skip "truth/galsim is not there"
 fi
+
+# a scene says one thing only; a set's name is a word that catalogues can carry
+printf '# DX DY RA DEC MAG TYPE\n0 0 150 2.2 20 star\n' >two.txt
+fails "two pairs of positions" 1 simage two.txt -x 0.1 --size 16,16 -o x.fits
+printf '# DX DY MAG FLUX TYPE\n0 0 20 5 star\n' >both.txt
+fails "MAG and FLUX" 1 simage both.txt -x 0.1 --size 16,16 -o x.fits
+printf '# DX DY MAG TYPE\n0 0 20 star\n' >one.txt
+fails "a name of two words" 2 simage one.txt -x 0.1 --size 16,16 --set 'a b' -o x.fits

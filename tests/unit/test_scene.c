@@ -142,7 +142,7 @@ static void test_scene(void)
     refuse_scene(&m, G1, 0, 0.98, "s: row 1: shear G1 0.98, G2 -0.2 must have |g| < 1");
     refuse_scene(&m, G1, 2, 1, "s: row 3: shear G1 1, G2 -0.2 must have |g| < 1");
     refuse_scene(&m, RE, 2, -0.1, "s: row 3: RE -0.1 must be > 0 and <= 1e6");
-    refuse_scene(&m, N, 3, 10, "s: row 4: N 10 is not in 0.3..8");
+    refuse_scene(&m, N, 3, 10, "s: row 4: N 10 is not in 0.5..8");
     refuse_scene(&m, Q, 3, 0, "s: row 4: Q 0 is not in 0.001..1");
     models_free(&m);
     table_free(&mt);
