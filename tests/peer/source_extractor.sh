@@ -103,7 +103,7 @@ field() { # NAME SEED SCALE SIZE SLOPE EXPOSURE
     read -r mm pm dm bm sm < <(N=$n SCALE=$scale score mine.cat)
     echo "# $name, same level in electrons (here $k sigma): detect: $mm $pm $dm $bm $sm"
     echo "$ms $ps $ds $bs $ss $mm $pm $dm $bm $sm" >>fields.txt
-    between "$name: matched, over Source Extractor's" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.955 1.3
+    between "$name: matched, over Source Extractor's (guards against losing more; the aim is 0.99)" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.955 1.3
     between "$name: purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.012 0.1
 }
 if [ -x "${BUILD:-$TOP/build}/tool/spoil" ]; then
@@ -117,7 +117,7 @@ if [ -x "${BUILD:-$TOP/build}/tool/spoil" ]; then
     between "position error over Source Extractor's" "$(awk '{ s += log($8 / $3) } END { print exp(s / NR) }' fields.txt)" 0.5 1.02
     # at 0.04 arcsec Source Extractor's sky, low by the 0.42 electron, makes up for light outside its ellipses
     between "magnitude bias less Source Extractor's, 0.16 arcsec" "$(awk '{ if (NR % 2 == 0) s += $9 - $4 } END { print s / 2 }' fields.txt)" -0.2 0.002
-    between "magnitude bias less Source Extractor's, 0.04 arcsec" "$(awk '{ if (NR % 2) s += $9 - $4 } END { print s / 2 }' fields.txt)" -0.2 0.06
+    between "magnitude bias less Source Extractor's, 0.04 arcsec (guards against more; the aim is 0)" "$(awk '{ if (NR % 2) s += $9 - $4 } END { print s / 2 }' fields.txt)" -0.2 0.06
     between "magnitude scatter over Source Extractor's" "$(awk '{ s += log($10 / $5) } END { print exp(s / NR) }' fields.txt)" 0.5 1.02
 else skip "build/tool/spoil is not built: four fields are not compared"; fi
 

@@ -62,6 +62,9 @@ static struct fom_result measure(const struct world *w, double scale, int fields
     int st = fom_group(n, p, o, &r);
     if (st)
         check_that(0, "fom_group: status %d", st);
+    free(r.block);            /* the numbers stay */
+    r.block = NULL;
+    r.blocks = 0;
     for (size_t i = 0; i < n; i++)
         fom_image_free(&im[i]);
     return r;
