@@ -414,13 +414,34 @@ static double median_area(const struct work *w)
     return m;
 }
 
+/* AB magnitude of one unit per second; NaN when unknown. */
+static double zero_point(const struct exposure *x)
+{
+    return x->unit == UNIT_RATE ? x->magzero : x->magzero - 2.5 * log10(x->exptime);
+}
+
+/* Exposures that are added must be in the same photometric system. */
+static void check_alike(const struct work *w)
+{
+    const struct shot *a = &w->shot[0];
+    for (size_t i = 1; i < w->n; i++) {
+        const struct shot *b = &w->shot[i];
+        if (b->x.unit != a->x.unit)
+            die(EXIT_RUN, "%s: BUNIT differs from that of %s", b->label, a->label);
+        if (fabs(zero_point(&b->x) - zero_point(&a->x)) > 1e-4)
+            die(EXIT_RUN, "%s: MAGZERO less 2.5 log10(EXPTIME) is %.4f, that of %s %.4f: scale one of them", b->label,
+                zero_point(&b->x), a->label, zero_point(&a->x));
+        if (fabs(b->x.gain - a->x.gain) > 1e-6 * a->x.gain)
+            die(EXIT_RUN, "%s: GAIN %g, that of %s %g: scale one of them", b->label, b->x.gain, a->label, a->x.gain);
+    }
+}
+
 static void set_units(struct work *w)
 {
     double times = 0, weights = 0;
     w->total = 0;
+    check_alike(w);
     for (size_t i = 0; i < w->n; i++) {
-        if (w->shot[i].x.unit != w->shot[0].x.unit)
-            die(EXIT_RUN, "%s: BUNIT differs from that of %s", w->shot[i].label, w->shot[0].label);
         w->total += w->shot[i].x.exptime;              /* NaN when one is missing */
     }
     if (w->r.units < 0)

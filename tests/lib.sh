@@ -45,3 +45,18 @@ col() { awk -v n="$2" '/^#/ { line = $0; next } !c { k = split(line, h, " "); fo
 key() { sed -n "s/^# Keyword: $2 = //p" "$1" | head -1; }
 # card FILE NAME: the value of a FITS card of the primary header
 card() { fold -w80 "$1" | grep -a -m1 "^$(printf %-8s "$2")=" | sed "s/^.\{10\} *//; s/ *\/.*//; s/^'\(.*\)'$/\1/; s/ *$//"; }
+# small_chain: one small file of each kind, from psf.fits to cut.txt
+small_chain() {
+    psfgen --pupil-grid 64 --size 32 -o psf.fits
+    galgen --field 12 -n 30 --models models.txt -o scene.txt
+    simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 120,120 -o true.fits
+    simage scene.txt --models models.txt -p psf.fits -x 0.1 --subpixel 2 --size 121,121 -o half.fits
+    galgen --field 12 --stars -n 25 | simage - -p psf.fits -x 0.1 --size 120,120 | addnoise --depth 27.7 -o stars.fits
+    addnoise --depth 27.7 true.fits -o noisy.fits
+    dither -n 2 half.fits -o dith.fits
+    detect noisy.fits -o cat.txt
+    detect stars.fits -o scat.txt
+    rrgshape --stars-only stars.fits scat.txt -o stars.rrg
+    rrgshape noisy.fits cat.txt --stars stars.rrg -o shapes.txt
+    cutcat shapes.txt --stars stars.rrg --snr 3 -o cut.txt
+}

@@ -212,3 +212,14 @@ fails "output is an input" 1 drizzle a.fits -o a.fits
 head -c 3000 a.fits >cut.fits
 fails "truncated input" 1 drizzle cut.fits -o no.fits
 [ ! -e no.fits ] && pass "no output left behind" || fail "a failed run left an output"
+
+# exposures of different photometric systems are not added
+galgen --field 4 --stars -n 4 -o few.txt
+simage few.txt -x 0.1 --size 40,40 -T 500 | addnoise --sky-rate 10 -o e1.fits
+simage few.txt -x 0.1 --size 40,40 -T 500 -z 28 | addnoise --sky-rate 10 -o e2.fits
+simage few.txt -x 0.1 --size 40,40 -T 1000 | addnoise --sky-rate 10 -o e3.fits
+simage few.txt -x 0.1 --size 40,40 -T 500 | addnoise --sky-rate 10 --gain 3 -o e4.fits
+simage few.txt -x 0.1 --size 40,40 -T 500 | addnoise --sky-rate 10 --gain 2 -o e5.fits
+fails "zero points 26.65 and 28" 1 drizzle e1.fits e2.fits -o x.fits
+ok "exposure times 500 and 1000" drizzle e1.fits e3.fits -o x.fits
+fails "gains 3 and 2" 1 drizzle e4.fits e5.fits -o x.fits

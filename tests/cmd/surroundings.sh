@@ -3,18 +3,7 @@
 # one output; and bad files in all of them: one line, under 64 MiB and 1 s.
 memory=yes
 if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then memory=; fi    # sanitizers reserve far more
-psfgen --pupil-grid 64 --size 32 -o psf.fits
-galgen --field 12 -n 30 --models models.txt -o scene.txt
-simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 120,120 -o true.fits
-simage scene.txt --models models.txt -p psf.fits -x 0.1 --subpixel 2 --size 121,121 -o half.fits
-galgen --field 12 --stars -n 25 | simage - -p psf.fits -x 0.1 --size 120,120 | addnoise --depth 27.7 -o stars.fits
-addnoise --depth 27.7 true.fits -o noisy.fits
-dither -n 2 half.fits -o dith.fits
-detect noisy.fits -o cat.txt
-detect stars.fits -o scat.txt
-rrgshape --stars-only stars.fits scat.txt -o stars.rrg
-rrgshape noisy.fits cat.txt --stars stars.rrg -o shapes.txt
-cutcat shapes.txt --stars stars.rrg --snr 3 -o cut.txt
+small_chain
 
 in=$PWD
 commands() { # prints one command a line; inputs by whole names
