@@ -224,6 +224,7 @@ static void undefined(void)
     struct fom_image im = image(&w, shears[0], 0.1, "f", 0);
     const struct fom_image *one[2] = {&im, &im};
     check_that(fom_group(2, one, &standard, &r) == OK && isnan(r.v[FOM_B1]) && isnan(r.v[FOM_BP1]), "all-equal shears: no slope");
+    fom_result_free(&r);
     fom_image_free(&im);
 }
 
