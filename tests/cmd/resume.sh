@@ -8,15 +8,17 @@ cd here/examples/pixelscale || exit 1
 rm -rf quick* paper* tiny*
 # the catalogues of two fields under three shears, and the pictures' numbers
 catalogues() { (cd "$1" && find . -maxdepth 1 \( -name '*.use' -o -name '*.cat' -o -name '*.rrg' -o -name '*.scene' -o -name '*.models' -o -name 'table.txt' -o -name 'psf*.fits' \) | sort | xargs sha256sum); }
+begin=$(date +%s%N)
 make -s tiny FIGURES= PICTURES= >log 2>&1 || fail "the tiny experiment fails: $(tail -3 log)"
+alone=$(($(date +%s%N) - begin))    # nanoseconds, the measure of the moments below
 catalogues tiny >whole
 between "catalogues of an undisturbed run" "$(grep -c use whole)" 24 24
 rm -rf tiny
 kills=0
-for wait in 0.15 0.4 0.7 0.3 1.0 0.5; do
+for part in 0.04 0.09 0.06 0.03 0.08 0.05; do
     setsid make -s -j2 tiny FIGURES= PICTURES= >log 2>&1 &
     leader=$!
-    sleep $wait
+    sleep "$(awk "BEGIN { print $part * $alone / 1e9 }")"
     kill -9 -- -$leader 2>/dev/null && kills=$((kills + 1))
     wait $leader 2>/dev/null
 done
