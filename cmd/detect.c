@@ -124,7 +124,7 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     struct err e;
     if (image_read(&f->im, in, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    double need = (double)image_count(&f->im) * (8 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0)) + 32 * 1048576.0;
+    double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0)) + 32 * 1048576.0;
     if (need > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
     if (o->measure)
@@ -276,9 +276,15 @@ static int check_row(enum check_type type, const struct frame *f, const struct d
             row[x] += (float)m->pivot;
         return OK;
     }
-    background_subtract(&d->background, f->im.pix + at, y, 0, nx, NAN, row);
-    for (long x = 0; x < nx && type == OBJECTS; x++)
-        row[x] = d->label[at + (size_t)x] ? row[x] : 0;
+    if (type == SUBTRACTED) {
+        background_subtract(&d->background, f->im.pix + at, y, 0, nx, NAN, row);
+        return OK;
+    }
+    memset(row, 0, (size_t)nx * sizeof *row);
+    for (size_t i = d->label.row[y]; i < d->label.row[y + 1]; i++) {
+        const struct label_run *r = &d->label.run[i];
+        background_subtract(&d->background, f->im.pix + at + r->x0, y, r->x0, r->x1 - r->x0, NAN, row + r->x0);
+    }
     return OK;
 }
 
@@ -330,11 +336,14 @@ static void write_check(const char *text, const struct frame *f, const struct de
     if (fits_out_open(&out, name, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     float *row = malloc((size_t)f->im.nx * sizeof *row);
+    int32_t *label = malloc((size_t)f->im.nx * sizeof *label);
     unsigned char *mark = type == APERTURES ? draw_apertures(f, p, d) : NULL;
-    int st = row ? fits_out_hdu(out, type == SEGMENTATION ? 32 : -32, f->im.nx, f->im.ny, 1, &h, &e)
+    int st = row && label ? fits_out_hdu(out, type == SEGMENTATION ? 32 : -32, f->im.nx, f->im.ny, 1, &h, &e)
                  : err_set(&e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
-    if (!st && type == SEGMENTATION)
-        st = fits_out_rows_int(out, f->im.ny, d->label, &e);
+    for (long y = 0; y < f->im.ny && type == SEGMENTATION && !st; y++) {
+        labels_row(&d->label, y, label);
+        st = fits_out_rows_int(out, 1, label, &e);
+    }
     for (long y = 0; y < f->im.ny && type != SEGMENTATION && !st; y++) {
         st = check_row(type, f, p, d, y, row);
         for (long x = 0; x < f->im.nx && mark; x++)
@@ -345,6 +354,7 @@ static void write_check(const char *text, const struct frame *f, const struct de
             st = fits_out_rows(out, 1, row, &e);
     }
     free(row);
+    free(label);
     free(mark);
     header_free(&h);
     if (st) {
@@ -407,7 +417,7 @@ static void detect_or_die(const struct frame *f, const char *in, const struct op
 
 static void describe(const struct frame *f, const char *in, const struct detect_params *p)
 {
-    double mb = (double)image_count(&f->im) * (f->map ? 12 : 8) / 1e6;
+    double mb = (double)image_count(&f->im) * (f->map ? 8 : 4) / 1e6;
     fprintf(stderr, "detect: %s: %ld x %ld pixels of %g arcsec, kernel %.3f px, gain %g, zero point %g, "
             "about %.0f MB and %.2f s\n", in, f->im.nx, f->im.ny, f->scale, p->kernel_fwhm, p->phot.gain,
             f->zeropoint, mb + 8, 1.2e-8 * (double)image_count(&f->im));

@@ -247,6 +247,7 @@ struct cells {
     const struct background_params *p;
     long mx, my;
     double *level, *sigma;         /* my*mx; NaN: no use */
+    long *bad;                     /* my: bad pixels of a row of cells */
     struct darksky *dark;
 };
 
@@ -288,10 +289,12 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
         return E_NOMEM;
     for (long j = begin; j < end; j++) {
         long y0 = j * ny / c->my, y1 = (j + 1) * ny / c->my;
+        c->bad[j] = nx * (y1 - y0);
         for (long i = 0; i < c->mx; i++) {
             long x0 = i * nx / c->mx, x1 = (i + 1) * nx / c->mx;
             long n = gather(c, x0, x1, y0, y1, buf), at = j * c->mx + i;
             c->level[at] = c->sigma[at] = NAN;
+            c->bad[j] -= n;
             if (n > 0 && n * 4 >= (x1 - x0) * (y1 - y0))
                 background_clip(buf, n, c->p->gain, c->p->removed, &c->level[at], &c->sigma[at]);
             else if (n > 0 && c->mx * c->my == 1)
@@ -604,6 +607,8 @@ static int finish(struct background *b, struct cells *c)
         return E_NOMEM;
     double *sigma = level + n, *sorted = level + 2 * n;
     struct background out = {0};
+    for (long j = 0; j < c->my; j++)
+        out.bad += c->bad[j];
     int st = median_filter(c->level, c->mx, c->my, c->p->filter, level);
     if (!st)
         st = median_filter(c->sigma, c->mx, c->my, c->p->filter, sigma);
@@ -638,8 +643,12 @@ int background_measure(struct background *b, const struct image *im, const float
     c.my = c.my < 1 ? 1 : c.my;
     size_t n = (size_t)c.mx * (size_t)c.my;
     c.level = malloc(2 * n * sizeof *c.level);
-    if (!c.level)
+    c.bad = malloc((size_t)c.my * sizeof *c.bad);
+    if (!c.level || !c.bad) {
+        free(c.level);
+        free(c.bad);
         return E_NOMEM;
+    }
     c.sigma = c.level + n;
     struct darksky dark = {0};
     c.dark = &dark;
@@ -656,6 +665,7 @@ int background_measure(struct background *b, const struct image *im, const float
     if (!st)
         st = finish(b, &c);
     free(c.level);
+    free(c.bad);
     return st;
 }
 

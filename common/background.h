@@ -28,6 +28,7 @@ struct background {
     struct mesh rms;       /* of a pixel's noise */
     double mean_level;     /* median over the cells */
     double mean_rms;
+    long bad;              /* pixels that do not count */
 };
 
 struct background_params {

@@ -13,7 +13,7 @@
 #include <string.h>
 
 enum { BRANCH = 3 };            /* least pixels of a deblended branch */
-enum { COMPONENTS = 256, OBJECTS = 64, RUNS = 4096 };      /* per task */
+enum { COMPONENTS = 256, OBJECTS = 64 };      /* per task */
 
 void detect_weights(float *map, size_t n, enum weight_type type)
 {
@@ -156,39 +156,39 @@ static int join_lists(struct blob_list *all, struct blob_list *list, long n, siz
     return OK;
 }
 
-struct paint {
-    const struct segments *s;
-    const int32_t *owner;
-    const size_t *base;
-    const int32_t *number;     /* per object before cleaning: its label */
-    int32_t *label;
-    long nx;
-};
-
-static int paint_runs(void *ctx, long begin, long end, int worker)
+/* Labels from runs and their pixels' objects. number: the label of every object before cleaning. */
+static int label_runs(const struct image *im, const struct segments *s, const int32_t *owner, const size_t *base,
+                      const int32_t *number, struct labels *l)
 {
-    (void)worker;
-    const struct paint *t = ctx;
-    for (long i = begin; i < end; i++) {
-        const struct run *r = &t->s->run[i];
-        const int32_t *owner = t->owner + r->at;
-        size_t base = t->base[r->component / COMPONENTS];
-        int32_t *label = t->label + (size_t)r->y * (size_t)t->nx;
-        for (int32_t x = r->x0; x < r->x1; x++)
-            label[x] = t->number[base + (size_t)owner[x - r->x0]];
+    size_t n = 0, cap = 0;
+    struct label_run *run = NULL;
+    int st = grow(&run, &cap, s->nrun + 1, sizeof *run);
+    for (size_t i = 0; i < s->nrun && !st; i++) {
+        const struct run *r = &s->run[i];
+        const int32_t *mine = owner + r->at, *of = number + base[r->component / COMPONENTS];
+        for (int32_t x = r->x0, end; x < r->x1 && !st; x = end) {
+            int32_t k = mine[x - r->x0];
+            for (end = x + 1; end < r->x1 && mine[end - r->x0] == k;)
+                end++;
+            st = grow(&run, &cap, n + 1, sizeof *run);
+            if (!st)
+                run[n++] = (struct label_run){r->y, x, end, of[k]};
+        }
     }
-    return OK;
+    if (!st)
+        st = labels_new(l, im->nx, im->ny, run, n);
+    free(run);
+    return st;
 }
 
-/* Clean, number the objects that stay, pack their blobs, paint the labels. */
+/* Clean, number the objects that stay, pack their blobs, label their pixels. */
 static int settle(const struct image *im, const struct detect_params *p, const struct segments *s,
                   const int32_t *owner, const size_t *base, struct blob_list *all,
                   struct detection *d)
 {
-    size_t n = all->n, kept = 0, pixels = image_count(im);
+    size_t n = all->n, kept = 0;
     int32_t *number = malloc((n + 1) * sizeof *number), *into = malloc((n + 1) * sizeof *into);
-    d->label = calloc(pixels, sizeof *d->label);
-    int st = number && into && d->label ? OK : E_NOMEM;
+    int st = number && into ? OK : E_NOMEM;
     if (!st && p->clean)
         st = clean_objects(all, p->clean_beta, im->nx, im->ny, into);
     for (size_t i = 0; i < n && !st; i++)
@@ -204,8 +204,7 @@ static int settle(const struct image *im, const struct detect_params *p, const s
         d->found = n;
         d->cleaned = n - kept;
         all->n = kept;
-        struct paint t = {s, owner, base, number, d->label, im->nx};
-        st = par_for((long)s->nrun, RUNS, p->threads, paint_runs, &t);
+        st = label_runs(im, s, owner, base, number, &d->label);
     }
     free(number);
     free(into);
@@ -284,7 +283,7 @@ static int measure_all(const struct image *im, const float *map, const struct de
     d->aperture = malloc((all->n * (2 * phot.napertures + phot.nfractions) + 1) * sizeof *d->aperture);
     if (!d->object || !d->aperture)
         return E_NOMEM;
-    struct measuring t = {{im, &d->background, d->label, &phot, 0}, all, d, p->progress, DETECT_STEPS / 2};
+    struct measuring t = {{im, &d->background, &d->label, &phot, 0}, all, d, p->progress, DETECT_STEPS / 2};
     if (p->measure) {
         struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads};
         int st = background_measure(&d->measured, p->measure, NULL, &bp);
@@ -292,7 +291,7 @@ static int measure_all(const struct image *im, const float *map, const struct de
             return st;
         phot.noise = d->measured.mean_rms;
         phot.rms_map = NULL;
-        t.f = (struct field){p->measure, &d->measured, d->label, &phot, 1};
+        t.f = (struct field){p->measure, &d->measured, &d->label, &phot, 1};
     }
     return par_for((long)all->n, OBJECTS, p->threads, measure_objects, &t);
 }
@@ -365,6 +364,6 @@ void detection_free(struct detection *d)
     smooth_free(&d->filter);
     free(d->object);
     free(d->aperture);
-    free(d->label);
+    labels_free(&d->label);
     *d = (struct detection){0};
 }

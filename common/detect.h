@@ -1,7 +1,7 @@
 /*
  * detect.h - from an image to measured objects: background, filter, threshold,
  * deblending, cleaning, photometry.  Linear in pixels plus detected pixels;
- * 8 bytes per pixel (image, labels), 4 more with a weight map, plus 12 bytes
+ * 4 bytes per pixel, 4 more with a weight map, plus 12 bytes
  * for each detected pixel while objects are being separated and 36 for those of
  * the component in hand.  A component larger than DETECT_MOST pixels and an
  * eighth of the image is not split and gets the flag DETECT_UNSEPARATED.
@@ -12,6 +12,7 @@
 #include "background.h"
 #include "err.h"
 #include "image.h"
+#include "labels.h"
 #include "photometry.h"
 #include "smooth.h"
 #include <stdint.h>
@@ -58,7 +59,7 @@ struct detection {
     size_t n;
     struct object *object;
     double *aperture;          /* n times 2 * napertures and nfractions */
-    int32_t *label;            /* nx*ny; 0 or 1 + index of the object */
+    struct labels label;       /* 1 + index of the object */
     size_t found, cleaned;     /* objects before cleaning, removed by it */
 };
 

@@ -57,25 +57,15 @@ void photometry_work_free(struct photometry_work *w)
 
 /* ---- the stamp ---- */
 
-static int usable(const struct field *f, size_t at, int32_t own)
+static int is_good(const struct field *f, size_t at)
 {
-    if (f->label[at] != 0 && f->label[at] != own)
-        return 0;
     return fabsf(f->im->pix[at]) <= FLT_MAX && (!f->p->rms_map || f->p->rms_map[at] <= FLT_MAX);
 }
 
-/* Replace pixel (x, y) of the image by its mirror image at the object, or 0. */
-static float mirrored(const struct field *f, double cx, double cy, long x, long y, int32_t own)
+static int usable(const struct field *f, long x, long y, int32_t own)
 {
-    long mx = lround(2 * cx - (double)x), my = lround(2 * cy - (double)y);
-    if (mx < 0 || my < 0 || mx >= f->im->nx || my >= f->im->ny)
-        return 0;
-    size_t at = (size_t)my * (size_t)f->im->nx + (size_t)mx;
-    if (!usable(f, at, own))
-        return 0;
-    float v;
-    background_subtract(f->b, f->im->pix + at, my, mx, 1, 0, &v);
-    return v;
+    int32_t label = labels_at(f->label, x, y);
+    return (label == 0 || label == own) && is_good(f, (size_t)y * (size_t)f->im->nx + (size_t)x);
 }
 
 WIDE static int finite_run(const float *v, long n)
@@ -86,12 +76,47 @@ WIDE static int finite_run(const float *v, long n)
     return !bad;
 }
 
-WIDE static int row_is_clean(const float *pix, const int32_t *label, int32_t own, long n)
+/* Mark what row y of the stamp has of other objects and of bad pixels; 1 when there is any. */
+static int mark_row(const struct field *f, const struct stamp *s, long y, int32_t own)
 {
-    int bad = 0;
-    for (long i = 0; i < n; i++)
-        bad |= (label[i] != 0 && label[i] != own) || !(fabsf(pix[i]) <= FLT_MAX);
-    return !bad;
+    const struct labels *l = f->label;
+    unsigned char *mark = s->replaced + y * s->nx;
+    long row = s->y0 + y, end = s->x0 + s->nx;
+    int any = 0;
+    for (size_t i = labels_from(l, row, s->x0); i < l->row[row + 1] && l->run[i].x0 < end; i++) {
+        if (l->run[i].label == own)
+            continue;
+        long a = l->run[i].x0 > s->x0 ? l->run[i].x0 : s->x0, b = l->run[i].x1 < end ? l->run[i].x1 : end;
+        memset(mark + (a - s->x0), 1, (size_t)(b - a));
+        any = 1;
+    }
+    size_t at = (size_t)row * (size_t)f->im->nx + (size_t)s->x0;
+    if (f->b->bad == 0 || (!f->p->rms_map && finite_run(f->im->pix + at, s->nx)))
+        return any;
+    for (long x = 0; x < s->nx; x++)
+        if (!is_good(f, at + (size_t)x))
+            any = mark[x] = 1;
+    return any;
+}
+
+/* The marked pixels of row y: the pixel mirrored at the object when that is free, else 0. */
+static void mirror_row(const struct field *f, struct stamp *s, double cx, double cy, long y, int32_t own)
+{
+    const unsigned char *mark = s->replaced + y * s->nx;
+    float *v = s->v + y * s->nx;
+    long my = lround(2 * cy - (double)(s->y0 + y)), inside_y = my - s->y0;
+    for (long x = 0; x < s->nx; x++) {
+        if (!mark[x])
+            continue;
+        long mx = lround(2 * cx - (double)(s->x0 + x)), inside_x = mx - s->x0;
+        v[x] = 0;
+        if (inside_x >= 0 && inside_y >= 0 && inside_x < s->nx && inside_y < s->ny) {
+            long m = inside_y * s->nx + inside_x;
+            v[x] = s->replaced[m] ? 0 : s->v[m];
+        } else if (mx >= 0 && my >= 0 && mx < f->im->nx && my < f->im->ny && usable(f, mx, my, own)) {
+            background_subtract(f->b, f->im->pix + (size_t)my * (size_t)f->im->nx + (size_t)mx, my, mx, 1, 0, &v[x]);
+        }
+    }
 }
 
 /* Cut |x - cx| <= hx, |y - cy| <= hy out of the image. */
@@ -118,20 +143,13 @@ static int cut_stamp(const struct field *f, double cx, double cy, double hx, dou
     s->any_replaced = 0;
     memset(s->replaced, 0, n);
     memset(s->v + n, 0, LANES * sizeof *s->v);
-    for (long y = y0; y < y1; y++) {
-        size_t at = (size_t)y * (size_t)nx + (size_t)x0;
-        float *v = s->v + (y - y0) * s->nx;
-        background_subtract(f->b, f->im->pix + at, y, x0, s->nx, 0, v);
-        if (!f->p->rms_map && row_is_clean(f->im->pix + at, f->label + at, own, s->nx))
-            continue;
-        for (long x = x0; x < x1; x++) {
-            if (usable(f, at + (size_t)(x - x0), own))
-                continue;
-            v[x - x0] = mirrored(f, cx, cy, x, y, own);
-            s->replaced[(y - y0) * s->nx + x - x0] = 1;
-            s->any_replaced = 1;
-        }
+    for (long y = 0; y < s->ny; y++) {
+        background_subtract(f->b, f->im->pix + (size_t)(y0 + y) * (size_t)nx + (size_t)x0, y0 + y, x0, s->nx, 0,
+                            s->v + y * s->nx);
+        s->any_replaced |= mark_row(f, s, y, own);
     }
+    for (long y = 0; y < s->ny && s->any_replaced; y++)
+        mirror_row(f, s, cx, cy, y, own);
     return OK;
 }
 
@@ -501,6 +519,8 @@ static void from_blob(const struct field *f, const struct blob *b, struct object
 /* A bad pixel inside or next to the isophote. */
 static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
 {
+    if (f->b->bad == 0)
+        return 0;
     long nx = f->im->nx, ny = f->im->ny;
     long x0 = b->xmin > 0 ? b->xmin - 1 : 0, x1 = b->xmax + 1 < nx ? b->xmax + 1 : nx - 1;
     long y0 = b->ymin > 0 ? b->ymin - 1 : 0, y1 = b->ymax + 1 < ny ? b->ymax + 1 : ny - 1;
@@ -515,7 +535,7 @@ static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
                 continue;
             for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < ny; v++)
                 for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < nx; u++)
-                    if (f->label[(size_t)v * (size_t)nx + (size_t)u] == own)
+                    if (labels_at(f->label, u, v) == own)
                         return 1;
         }
     }
@@ -624,21 +644,20 @@ static struct blob sum_again(const struct field *f, const struct blob *blob, int
     b.flux = 0;
     b.above = 0;
     b.peak = -INFINITY;
+    const struct labels *l = f->label;
     for (long y = b.ymin; y <= b.ymax; y++)
-        for (long x = b.xmin; x <= b.xmax; x++) {
-            size_t at = (size_t)y * (size_t)f->im->nx + (size_t)x;
-            float v;
-            if (f->label[at] != own)
-                continue;
-            background_subtract(f->b, f->im->pix + at, y, x, 1, 0, &v);
-            b.flux += (double)v;
-            b.above += (double)v > b.threshold;
-            if ((double)v > b.peak) {
-                b.peak = (double)v;
-                b.xpeak = (int32_t)x;
-                b.ypeak = (int32_t)y;
+        for (size_t i = labels_from(l, y, b.xmin); i < l->row[y + 1] && l->run[i].x0 <= b.xmax; i++)
+            for (int32_t x = l->run[i].x0; x < l->run[i].x1 && l->run[i].label == own; x++) {
+                float v;
+                background_subtract(f->b, f->im->pix + (size_t)y * (size_t)f->im->nx + (size_t)x, y, x, 1, 0, &v);
+                b.flux += (double)v;
+                b.above += (double)v > b.threshold;
+                if ((double)v > b.peak) {
+                    b.peak = (double)v;
+                    b.xpeak = x;
+                    b.ypeak = (int32_t)y;
+                }
             }
-        }
     return b;
 }
 

@@ -14,6 +14,7 @@
 #include "err.h"
 #include "growth.h"
 #include "image.h"
+#include "labels.h"
 #include <stdint.h>
 
 /* FLAGS; DETECT_BLENDED (2) and DETECT_UNSEPARATED (64) are in deblend.h. */
@@ -57,7 +58,7 @@ struct object {
 struct field {
     const struct image *im;
     const struct background *b;
-    const int32_t *label;      /* nx*ny: 0 or 1 + index of the object */
+    const struct labels *label;
     const struct photometry_params *p;
     int again;                 /* this is not the image of the detection: isophotes are summed here */
 };

@@ -1,0 +1,53 @@
+/*
+ * labels.h - which object a pixel belongs to, as runs of each row: memory goes
+ * with the objects, not with the image, and looking at a piece of sky costs
+ * nothing.
+ */
+#ifndef PIXSHEAR_LABELS_H
+#define PIXSHEAR_LABELS_H
+
+#include "err.h"
+#include <stddef.h>
+#include <stdint.h>
+
+/* Pixels x0 <= x < x1 of row y. */
+struct label_run {
+    int32_t y, x0, x1;
+    int32_t label;             /* 1 + index of the object */
+};
+
+struct labels {
+    long nx, ny;
+    struct label_run *run;     /* row by row, x rising, no two overlap */
+    size_t *row;               /* ny + 1: where each row begins */
+};
+
+/* Take n runs in any order (no two overlap). E_NOMEM leaves *l alone. Linear time. */
+MUST_CHECK int labels_new(struct labels *l, long nx, long ny, const struct label_run *run, size_t n);
+void labels_free(struct labels *l);
+
+/* The first run of row y that ends beyond x, or l->row[y + 1]. */
+static inline size_t labels_from(const struct labels *l, long y, long x)
+{
+    size_t a = l->row[y], b = l->row[y + 1];
+    while (a < b) {
+        size_t m = a + (b - a) / 2;
+        if (l->run[m].x1 > x)
+            b = m;
+        else
+            a = m + 1;
+    }
+    return a;
+}
+
+/* Label of a pixel, 0 none. */
+static inline int32_t labels_at(const struct labels *l, long x, long y)
+{
+    size_t i = labels_from(l, y, x);
+    return i < l->row[y + 1] && l->run[i].x0 <= x ? l->run[i].label : 0;
+}
+
+/* The labels of row y into out, nx values. */
+void labels_row(const struct labels *l, long y, int32_t *out);
+
+#endif
