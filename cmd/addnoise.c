@@ -24,7 +24,7 @@ struct request {
     const char *psf;
     double psf_scale;
     double dark, read_noise, gain, saturate, qe;
-    int subtract;
+    int subtract, mirror;
 };
 
 /* One exposure and what will be done to it. */
@@ -115,6 +115,7 @@ static void decide(const struct work *w, struct plan *p)
     const double before = p->subtracted ? 0 : header_double_or(&x->hdr, "SKYLEVEL", 0) * r->qe;
     p->level = before + m->sky + m->dark;
     m->subtract = r->subtract ? p->level : 0;
+    m->mirror = r->mirror;
     if (w->c->verbose || w->c->check)
         fprintf(stderr, "addnoise: %s: %ld x %ld, sky %.6g e/s/arcsec2 = %.6g e, dark %.6g e, read noise %g e, "
                 "gain %g, about %.2g s\n", p->label, x->nx, x->ny, p->rate, m->sky, m->dark, m->read_noise, m->gain,
@@ -149,6 +150,8 @@ static int describe(const struct work *w, struct plan *p, const char *record)
     }
     if (st == OK)
         st = header_set_str(h, "SEED", seed, "seed of the noise");
+    if (st == OK && r->mirror)
+        st = header_set_long(h, "MIRROR", 1, "the opposite noise of this seed");
     return st == OK ? header_history(h, record) : st;
 }
 
@@ -281,6 +284,7 @@ int main(int argc, char **argv)
         {"saturate", 0, OPT_REAL, &r.saturate, 1e-9, 1e15, "E", "electrons at which a pixel is cut", 0, 0},
         {"qe", 0, OPT_REAL, &r.qe, 1e-9, 1e9, "F", "factor on the input image", 0, 0},
         {"subtract-sky", 0, OPT_FLAG, &r.subtract, 0, 0, 0, "take the mean of sky and dark off again", 0, 0},
+        {"mirror", 0, OPT_FLAG, &r.mirror, 0, 0, 0, "the opposite noise: 1 - u for every uniform number u", 0, 0},
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);

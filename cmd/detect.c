@@ -203,7 +203,7 @@ static void copy_keywords(struct table *t, const struct frame *f, const struct d
 {
     static const char *const keys[] = {"CCDSCALE", "EXPTIME", "TOTTIME", "SHEAR1", "SHEAR2", "SETNAME", "SEED",
                                        "FIELDID", "EXPNUM", "PSFFWHM", "PSFFILE", "CHDIFF", "NOISECOR", "SKYLEVEL",
-                                       "SKYSUB", NULL};
+                                       "SKYSUB", "MIRROR", NULL};
     const struct header *h = &f->im.hdr;
     int st = OK;
     if (f->scale > 0) {

@@ -272,7 +272,7 @@ static struct starmom *find_psf(struct starmom *s, const struct input *in, const
 static void copy_keywords(struct table *t, const struct header *h)
 {
     static const char *const number[] = {"PIXSCALE", "CCDSCALE", "EXPTIME", "TOTTIME", "MAGZERO", "GAIN",
-                                         "SHEAR1", "SHEAR2", "PSFFWHM", "NOISECOR"};
+                                         "SHEAR1", "SHEAR2", "PSFFWHM", "NOISECOR", "MIRROR"};
     static const char *const text[] = {"SETNAME", "SEED", "FIELDID"};
     for (size_t k = 0; k < sizeof number / sizeof *number; k++) {
         double v;

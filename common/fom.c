@@ -16,8 +16,10 @@
     {"BPAIR" c "SE", "", "its standard error"}, \
     {"BPAIR" c "JK", "", "its error by jackknife"}, \
     {"BPAIR" c "BS", "", "its error by bootstrap"}, \
+    {"BPAIR" c "BK", "", "its error by leaving out 16 parts of each sky"}, \
     {"BTENSOR" c, "", "slope by common objects, own response component"}, \
     {"BTENSOR" c "SE", "", "its standard error"}, \
+    {"BTENSOR" c "BK", "", "its error by leaving out 16 parts of each sky"}, \
     {"CPAIR" c, "", "mean shear of common objects"}, \
     {"CPAIR" c "SE", "", "its standard error"}
 
@@ -32,9 +34,9 @@ const struct fom_text fom_column[FOM_QUANTITIES] = {
     {"N_EFF", "arcmin-2", "effective number for equal weights"},
     {"G", "", "mean response"},
     {"SIGMA_E", "", "spread of the ellipticity"},
-    {"B1", "", "slope of shear 1, fit"}, {"B1SE", "", "its standard error"},
+    {"B1", "", "slope of shear 1, fit"}, {"B1SE", "", "its standard error"}, {"B1JK", "", "its error by leaving out skies"},
     {"A1", "", "intercept of shear 1"}, {"A1SE", "", "its standard error"}, {"CHISQ1", "", "chi squared of the fit"},
-    {"B2", "", "slope of shear 2, fit"}, {"B2SE", "", "its standard error"},
+    {"B2", "", "slope of shear 2, fit"}, {"B2SE", "", "its standard error"}, {"B2JK", "", "its error by leaving out skies"},
     {"A2", "", "intercept of shear 2"}, {"A2SE", "", "its standard error"}, {"CHISQ2", "", "chi squared of the fit"},
     {"DOF", "", "degrees of freedom"},
     {"SIGMA1", "", "spread of shear 1 before the line"}, {"SIGMA2", "", "spread of shear 2 before the line"},
@@ -182,37 +184,81 @@ static int spread(struct group *s, int c, double *var_e)
     return st;
 }
 
-/* The paper's fit: every image a point, x = shear put in, y = <e>/G, error sigma/sqrt(n). */
-static int fit(struct group *s, int c)
+/* The points of the fit: x the shear put in, y = <e>/G, err sigma/sqrt(n); sky[k] is the sky of point k. */
+struct points {
+    size_t n;
+    double *x, *y, *err;
+    size_t *sky;
+};
+
+static void gather(const struct group *s, int c, double sigma, struct points *p)
 {
-    static const int at[2] = {FOM_B1, FOM_B2}, sigma[2] = {FOM_SIGMA1, FOM_SIGMA2};
-    double *m = malloc(3 * (s->n + 1) * sizeof *m);
-    if (!m)
-        return E_NOMEM;
-    double *x = m, *y = m + s->n, *err = y + s->n;
-    size_t points = 0;
     for (size_t k = 0; k < s->n; k++) {
         struct sum sum = {0};
-        size_t n = fom_image_used(s->im[k]);
+        size_t n = fom_image_used(s->im[k]), sky = 0;
         for (size_t i = 0; i < s->im[k]->n; i++)
             if (s->im[k]->object[i].used)
                 sum_add(&sum, s->im[k]->object[i].e[c]);
         if (n < 2)
             continue;
-        x[points] = s->o->psf ? s->im[k]->epsf[c] : s->im[k]->g[c];
-        y[points] = sum_value(&sum) / (double)n / s->g;
-        err[points++] = s->v[sigma[c]] / sqrt((double)n);
+        while (strcmp(s->im[sky]->sky, s->im[k]->sky) != 0)
+            sky++;
+        p->x[p->n] = s->o->psf ? s->im[k]->epsf[c] : s->im[k]->g[c];
+        p->y[p->n] = sum_value(&sum) / (double)n / s->g;
+        p->err[p->n] = sigma / sqrt((double)n);
+        p->sky[p->n++] = sky;
     }
+}
+
+/* Jackknife of the slope over skies, whose images share their galaxies; NaN below three. */
+static double fit_jackknife(const struct group *s, const struct points *p, struct points *rest)
+{
+    double sum = 0, sum2 = 0, m = 0;
+    for (size_t out = 0; out < s->n; out++) {
+        struct line_fit f;
+        rest->n = 0;
+        for (size_t k = 0; k < p->n; k++)
+            if (p->sky[k] != out) {
+                rest->x[rest->n] = p->x[k];
+                rest->y[rest->n] = p->y[k];
+                rest->err[rest->n++] = p->err[k];
+            }
+        if (rest->n == p->n)
+            continue;
+        if (stats_line(rest->n, rest->x, rest->y, rest->err, &f))
+            return NAN;
+        sum += f.b;
+        sum2 += f.b * f.b;
+        m++;
+    }
+    return m >= 3 ? sqrt((m - 1) * fmax(sum2 / m - (sum / m) * (sum / m), 0)) : NAN;
+}
+
+/* The paper's fit: every image a point. */
+static int fit(struct group *s, int c)
+{
+    static const int at[2] = {FOM_B1, FOM_B2}, sigma[2] = {FOM_SIGMA1, FOM_SIGMA2};
+    double *m = malloc(6 * (s->n + 1) * sizeof *m);
+    size_t *sky = malloc((s->n + 1) * sizeof *sky);
     struct line_fit f;
-    int st = stats_line(points, x, y, err, &f);
+    int st = m && sky ? OK : E_NOMEM;
+    if (st == OK) {
+        struct points p = {0, m, m + s->n, m + 2 * s->n, sky}, rest = {0, m + 3 * s->n, m + 4 * s->n, m + 5 * s->n, NULL};
+        gather(s, c, s->v[sigma[c]], &p);
+        st = stats_line(p.n, p.x, p.y, p.err, &f);
+        s->v[at[c] + 2] = st ? NAN : fit_jackknife(s, &p, &rest);
+    }
     free(m);
+    free(sky);
+    if (st == E_NOMEM)
+        return st;
     if (st == E_RANGE || st == E_SINGULAR)
         st = OK;                          /* undefined: NaN */
     s->v[at[c]] = f.b;
     s->v[at[c] + 1] = f.se_b;
-    s->v[at[c] + 2] = f.a;
-    s->v[at[c] + 3] = f.se_a;
-    s->v[at[c] + 4] = f.chi2;
+    s->v[at[c] + 3] = f.a;
+    s->v[at[c] + 4] = f.se_a;
+    s->v[at[c] + 5] = f.chi2;
     s->v[FOM_DOF] = (double)f.dof;
     return st;
 }
@@ -254,10 +300,12 @@ static int pairs(struct group *s, int c)
     v[2] = p.scalar.se;
     v[3] = p.scalar.jackknife;
     v[4] = p.scalar.bootstrap;
-    v[5] = p.tensor.value;
-    v[6] = p.tensor.se;
-    v[7] = p.mean / p.response;
-    v[8] = p.mean_se / p.response;
+    v[5] = p.scalar_block;
+    v[6] = p.tensor.value;
+    v[7] = p.tensor.se;
+    v[8] = p.tensor_block;
+    v[9] = p.mean / p.response;
+    v[10] = p.mean_se / p.response;
     m[0] = p.selection / s->g;
     m[1] = p.selection_se / s->g;
     m[2] = p.total / s->g - (s->o->psf ? 0 : 1);
@@ -271,24 +319,12 @@ void fom_result_free(struct fom_result *r)
     *r = (struct fom_result){0};
 }
 
-/* 4 x 4 parts of the field, by the place of an object between the outermost ones. */
-static int part_of(double x, double y, const double box[4])
+/* Add one image to the blocks of its sky; part has room for n. */
+static int add_blocks(struct fom_block *b, const struct fom_image *im, int *part)
 {
-    double u = 4 * (x - box[0]) / (box[1] - box[0]), v = 4 * (y - box[2]) / (box[3] - box[2]);
-    int i = u > 0 ? u < 4 ? (int)u : 3 : 0, j = v > 0 ? v < 4 ? (int)v : 3 : 0;
-    return 4 * j + i;
-}
-
-/* Add one image to the 16 blocks of its field; xy has room for 2 n. */
-static int add_blocks(struct fom_block *b, const struct fom_image *im, double *xy)
-{
-    double *x = xy, *y = xy + im->n, box[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY}, mean[2] = {0}, n = 0;
-    int st = fom_flat(im, x, y);
+    double mean[2] = {0}, n = 0;
+    int st = fom_parts(im, part);
     for (size_t i = 0; i < im->n && st == OK; i++) {
-        box[0] = fmin(box[0], x[i]);
-        box[1] = fmax(box[1], x[i]);
-        box[2] = fmin(box[2], y[i]);
-        box[3] = fmax(box[3], y[i]);
         if (!im->object[i].used)
             continue;
         mean[0] += im->object[i].e[0];
@@ -299,7 +335,7 @@ static int add_blocks(struct fom_block *b, const struct fom_image *im, double *x
         const struct fom_object *o = &im->object[i];
         if (!o->used)
             continue;
-        struct fom_block *to = &b[part_of(x[i], y[i], box)];
+        struct fom_block *to = &b[part[i]];
         double d1 = o->e[0] - mean[0] / n, d2 = o->e[1] - mean[1] / n;
         to->n++;
         to->p += 0.5 * (o->p[0] + o->p[1]);
@@ -313,22 +349,23 @@ static int blocks(const struct group *s, struct fom_result *out)
     size_t most = 0, made = 0;
     for (size_t k = 0; k < s->n; k++)
         most = s->im[k]->n > most ? s->im[k]->n : most;
-    double *xy = malloc((2 * most + 1) * sizeof *xy);
-    out->block = calloc(16 * s->fields, sizeof *out->block);
-    int st = xy && out->block ? OK : E_NOMEM;
+    int *part = malloc((most + 1) * sizeof *part);
+    out->block = calloc(FOM_PARTS * s->fields, sizeof *out->block);
+    int st = part && out->block ? OK : E_NOMEM;
     for (size_t k = 0; k < s->n && st == OK; k++) {
         size_t f = 0;
-        while (f < made && strcmp(out->block[16 * f].field, s->im[k]->field) != 0)
+        while (f < made && strcmp(out->block[FOM_PARTS * f].sky, s->im[k]->sky) != 0)
             f++;
-        for (int j = 0; f == made && j < 16; j++) {
-            memcpy(out->block[16 * f + (size_t)j].field, s->im[k]->field, sizeof out->block->field);
-            out->block[16 * f + (size_t)j].part = j;
+        for (int j = 0; f == made && j < FOM_PARTS; j++) {
+            struct fom_block *b = &out->block[FOM_PARTS * f + (size_t)j];
+            memcpy(b->sky, s->im[k]->sky, sizeof b->sky);
+            b->part = j;
         }
         made += f == made;
-        st = add_blocks(out->block + 16 * f, s->im[k], xy);
+        st = add_blocks(out->block + FOM_PARTS * f, s->im[k], part);
     }
-    out->blocks = 16 * made;
-    free(xy);
+    out->blocks = FOM_PARTS * made;
+    free(part);
     return st;
 }
 
@@ -337,7 +374,7 @@ static size_t count_fields(size_t n, const struct fom_image *const *im)
     size_t fields = 0;
     for (size_t i = 0; i < n; i++) {
         size_t j = 0;
-        while (j < i && strcmp(im[i]->field, im[j]->field) != 0)
+        while (j < i && strcmp(im[i]->sky, im[j]->sky) != 0)
             j++;
         fields += j == i;
     }

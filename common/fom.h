@@ -32,11 +32,11 @@ struct fom_options {
 enum fom_quantity {
     FOM_N_DET, FOM_N_STARCUT, FOM_N_ELLCUT, FOM_N_SIZECUT, FOM_N_SNRCUT, FOM_N_GAL, FOM_N_GALERR, FOM_N_EFF,
     FOM_G, FOM_SIGMA_E,
-    FOM_B1, FOM_B1SE, FOM_A1, FOM_A1SE, FOM_CHI1, FOM_B2, FOM_B2SE, FOM_A2, FOM_A2SE, FOM_CHI2, FOM_DOF,
+    FOM_B1, FOM_B1SE, FOM_B1JK, FOM_A1, FOM_A1SE, FOM_CHI1, FOM_B2, FOM_B2SE, FOM_B2JK, FOM_A2, FOM_A2SE, FOM_CHI2, FOM_DOF,
     FOM_SIGMA1, FOM_SIGMA2, FOM_SIGMA, FOM_SIGMAERR, FOM_STDERR, FOM_STDERRERR,
     FOM_SKEW1, FOM_SKEW1ERR, FOM_KURT1, FOM_KURT1ERR, FOM_SKEW2, FOM_SKEW2ERR, FOM_KURT2, FOM_KURT2ERR,
-    FOM_PAIRS1, FOM_BP1, FOM_BP1SE, FOM_BP1JK, FOM_BP1BS, FOM_BT1, FOM_BT1SE, FOM_CP1, FOM_CP1SE,
-    FOM_PAIRS2, FOM_BP2, FOM_BP2SE, FOM_BP2JK, FOM_BP2BS, FOM_BT2, FOM_BT2SE, FOM_CP2, FOM_CP2SE,
+    FOM_PAIRS1, FOM_BP1, FOM_BP1SE, FOM_BP1JK, FOM_BP1BS, FOM_BP1BK, FOM_BT1, FOM_BT1SE, FOM_BT1BK, FOM_CP1, FOM_CP1SE,
+    FOM_PAIRS2, FOM_BP2, FOM_BP2SE, FOM_BP2JK, FOM_BP2BS, FOM_BP2BK, FOM_BT2, FOM_BT2SE, FOM_BT2BK, FOM_CP2, FOM_CP2SE,
     FOM_SEL1, FOM_SEL1SE, FOM_TOT1, FOM_TOT1SE, FOM_SEL2, FOM_SEL2SE, FOM_TOT2, FOM_TOT2SE,
     FOM_L1, FOM_L1A, FOM_L1ASE, FOM_L1B, FOM_L1BSE, FOM_L2, FOM_L2A, FOM_L2ASE, FOM_L2B, FOM_L2BSE,
     FOM_LOGDC, FOM_LOGDCERR, FOM_OPT, FOM_OPTERR,
@@ -48,9 +48,9 @@ struct fom_text {
 };
 extern const struct fom_text fom_column[FOM_QUANTITIES];
 
-/* Sums over the used objects of one of 16 parts of a field, all images of the field. */
+/* Sums over the used objects of one part of a sky, all images of that sky. */
 struct fom_block {
-    char field[64];
+    char sky[64];
     int part;
     double n, p, s2;          /* number, sum of (P11 + P22)/2, sum of squared e about the image's mean */
 };

@@ -20,7 +20,11 @@ static int read_keywords(struct fom_image *im, const struct table *t, struct err
 {
     static const char *const count[5] = {"NDET", "NSTARCUT", "NELLCUT", "NSIZECUT", "NSNRCUT"};
     copy_word(im->set, table_text(t, "SETNAME"), "-");
-    copy_word(im->field, table_text(t, "FIELDID") ? table_text(t, "FIELDID") : table_text(t, "SEED"), "-");
+    double mirror;
+    copy_word(im->sky, table_text(t, "FIELDID") ? table_text(t, "FIELDID") : table_text(t, "SEED"), "-");
+    memcpy(im->field, im->sky, sizeof im->field);
+    if (table_key_number(t, "MIRROR", &mirror) == OK && mirror > 0)
+        snprintf(im->field, sizeof im->field, "%.61s~", im->sky);
     for (int k = 0; k < 2; k++)
         if (table_key_number(t, k ? "SHEAR2" : "SHEAR1", &im->g[k]) != OK)
             return err_set(e, E_MISSING, "no keyword SHEAR%d: shapes must be measured on an image that has it", k + 1);
@@ -62,7 +66,7 @@ static size_t sorted(struct place *p, const struct fom_image *im, const double o
         if (!isfinite(o->x) || !isfinite(o->y))
             continue;
         p[m] = (struct place){o->x, o->y, i};
-        if (im->sky)
+        if (im->on_sky)
             p[m] = (struct place){remainder(o->x - origin[0], 360) * scale, (o->y - origin[1]) * 3600, i};
         m++;
     }
@@ -74,7 +78,7 @@ static size_t sorted(struct place *p, const struct fom_image *im, const double o
 static void find_origin(const struct fom_image *im, double origin[2])
 {
     origin[0] = origin[1] = 0;
-    for (size_t i = im->n; im->sky && i-- > 0;)
+    for (size_t i = im->n; im->on_sky && i-- > 0;)
         if (isfinite(im->object[i].x) && isfinite(im->object[i].y)) {
             origin[0] = im->object[i].x;
             origin[1] = im->object[i].y;
@@ -146,11 +150,11 @@ int fom_image_read(struct fom_image *im, const struct table *t, const char *key,
         return st;
     const struct column *ra = table_find(t, "ALPHA_J2000"), *dec = table_find(t, "DELTA_J2000"), *cut = table_find(t, "CUT");
     const struct column *x = table_find(t, "X_IMAGE"), *y = table_find(t, "Y_IMAGE");
-    r.sky = ra && dec;
-    if (!r.sky && !(x && y))
+    r.on_sky = ra && dec;
+    if (!r.on_sky && !(x && y))
         return err_set(e, E_MISSING, "no positions: columns ALPHA_J2000 DELTA_J2000 or X_IMAGE Y_IMAGE");
     double px = 1;
-    if (!r.sky && table_key_number(t, "PIXSCALE", &px) != OK)
+    if (!r.on_sky && table_key_number(t, "PIXSCALE", &px) != OK)
         return err_set(e, E_MISSING, "no keyword PIXSCALE and no sky positions");
     r.marked = cut != NULL;
     r.object = calloc(t->nrow + 1, sizeof *r.object);
@@ -159,8 +163,8 @@ int fom_image_read(struct fom_image *im, const struct table *t, const char *key,
     for (size_t i = 0; i < t->nrow; i++) {
         struct fom_object *o = &r.object[i];
         *o = (struct fom_object){
-            .x = r.sky ? table_number(ra, i) : table_number(x, i) * px,
-            .y = r.sky ? table_number(dec, i) : table_number(y, i) * px,
+            .x = r.on_sky ? table_number(ra, i) : table_number(x, i) * px,
+            .y = r.on_sky ? table_number(dec, i) : table_number(y, i) * px,
             .e = {table_number(c[0], i), table_number(c[1], i)}, .err = {table_number(c[2], i), table_number(c[3], i)},
             .p = {table_number(c[4], i), table_number(c[5], i)}};
         int good = isfinite(o->e[0]) && isfinite(o->e[1]) && isfinite(o->p[0]) && isfinite(o->p[1]);
@@ -229,19 +233,26 @@ int fom_match(const struct fom_image *a, const struct fom_image *b, double radiu
     return st;
 }
 
-int fom_flat(const struct fom_image *im, double *x, double *y)
+int fom_parts(const struct fom_image *im, int *part)
 {
     struct place *p = malloc((im->n + 1) * sizeof *p);
-    double origin[2];
+    double origin[2], box[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
     if (!p)
         return E_NOMEM;
     find_origin(im, origin);
     size_t m = sorted(p, im, origin);
-    for (size_t i = 0; i < im->n; i++)
-        x[i] = y[i] = NAN;
     for (size_t k = 0; k < m; k++) {
-        x[p[k].i] = p[k].x;
-        y[p[k].i] = p[k].y;
+        box[0] = fmin(box[0], p[k].x);
+        box[1] = fmax(box[1], p[k].x);
+        box[2] = fmin(box[2], p[k].y);
+        box[3] = fmax(box[3], p[k].y);
+    }
+    for (size_t i = 0; i < im->n; i++)
+        part[i] = 0;
+    for (size_t k = 0; k < m; k++) {
+        double u = 4 * (p[k].x - box[0]) / (box[1] - box[0]), v = 4 * (p[k].y - box[2]) / (box[3] - box[2]);
+        int i = u > 0 ? u < 4 ? (int)u : 3 : 0, j = v > 0 ? v < 4 ? (int)v : 3 : 0;
+        part[p[k].i] = 4 * j + i;
     }
     free(p);
     return OK;

@@ -21,14 +21,16 @@ struct fom_object {
 };
 
 struct fom_image {
-    char set[64], field[64];  /* SETNAME; FIELDID or SEED: images of one field show the same galaxies */
+    char set[64];             /* SETNAME */
+    char sky[64];             /* FIELDID or SEED: images of one sky show the same galaxies */
+    char field[64];           /* the same, with a sign of its own for mirrored noise: one noise under all shears */
     double scale;             /* CCDSCALE, arcsec */
     double g[2];              /* SHEAR1, SHEAR2 */
     double epsf[2];           /* EPSF1, EPSF2: ellipticity of the PSF; NaN: unknown */
     double area;              /* arcmin^2; NaN: unknown */
     double count[5];          /* left after: detection, stars, ellipticity, size, S/N; NaN: unknown */
     int marked;               /* has a column CUT: rows that fail are there too */
-    int sky;                  /* positions are on the sky */
+    int on_sky;               /* positions are on the sky */
     size_t n;
     struct fom_object *object;
 };
@@ -54,7 +56,9 @@ size_t fom_image_used(const struct fom_image *im);
  */
 MUST_CHECK int fom_match(const struct fom_image *a, const struct fom_image *b, double radius, long *to);
 
-/* Positions in arcsec on a plane about one of the objects; NaN where there is none. */
-MUST_CHECK int fom_flat(const struct fom_image *im, double *x, double *y);
+#define FOM_PARTS 16
+
+/* part[i], 0..FOM_PARTS - 1: which of 4 x 4 parts of the sky between the outermost objects object i lies in. */
+MUST_CHECK int fom_parts(const struct fom_image *im, int *part);
 
 #endif

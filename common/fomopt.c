@@ -36,7 +36,7 @@ static void set_labels(struct curve *c)
             size_t found = c->labels;
             for (size_t a = 0; a < i && found == c->labels; a++)
                 for (size_t b = 0; b < c->r[a]->blocks && found == c->labels; b += 16)
-                    if (strcmp(c->r[a]->block[b].field, c->r[i]->block[k].field) == 0)
+                    if (strcmp(c->r[a]->block[b].sky, c->r[i]->block[k].sky) == 0)
                         found = c->label[a][b];
             for (size_t j = 0; j < 16; j++)
                 c->label[i][k + j] = (uint32_t)(found + j);

@@ -19,6 +19,7 @@ struct side {
 
 struct field {
     const struct fom_image *list;
+    size_t sky;               /* number of the first image of its sky */
     int has_zero;             /* the list is unsheared */
     size_t n;
     struct side side[LEVELS];
@@ -40,6 +41,7 @@ struct sums {
 struct common {
     size_t n, cap;
     double *r, *g, *p, *mean;
+    size_t *block;            /* part of the sky, FOM_PARTS a sky */
 };
 
 static int same(double a, double b)
@@ -105,6 +107,11 @@ static int field_open(struct field *f, size_t n, const struct fom_image *const *
 {
     *f = (struct field){.list = l->psf ? NULL : find(n, im, name, c, 0, 0)};
     f->has_zero = f->list != NULL;
+    while (strcmp(im[f->sky]->field, name) != 0)
+        f->sky++;
+    for (size_t i = f->sky; i-- > 0;)
+        if (strcmp(im[i]->sky, im[f->sky]->sky) == 0)
+            f->sky = i;
     if (!f->list)
         f->list = find(n, im, name, c, l->psf, l->x[0]);
     for (int k = 0; k < l->n; k++) {
@@ -141,7 +148,16 @@ static int add_common(struct common *all, const struct field *f, int c)
                 return E_NOMEM;
             *to[k] = mem;
         }
+        size_t *block = realloc(all->block, cap * sizeof *block);
+        if (!block)
+            return E_NOMEM;
+        all->block = block;
         all->cap = cap;
+    }
+    int *part = malloc((f->list->n + 1) * sizeof *part), st = part ? fom_parts(f->list, part) : E_NOMEM;
+    if (st) {
+        free(part);
+        return st;
     }
     for (size_t i = 0; i < f->list->n; i++) {
         double r = 0, g = 0, p = 0, mean = 0, m = (double)f->n;
@@ -160,8 +176,10 @@ static int add_common(struct common *all, const struct field *f, int c)
         all->r[all->n] = r;
         all->g[all->n] = g;
         all->p[all->n] = p;
+        all->block[all->n] = FOM_PARTS * f->sky + (size_t)part[i];
         all->mean[all->n++] = mean;
     }
+    free(part);
     return OK;
 }
 
@@ -225,12 +243,41 @@ static void add_variance(double var[2], const struct sums *sum, const struct fie
     }
 }
 
-static int ratios(struct fom_pairs *out, const struct common *all, long draws, uint64_t seed)
+/*
+ * Error of sum r / sum g when the parts of the skies are left out one at a time: galaxies near each other, and the same
+ * galaxy under several noises, are not independent.  NaN below 8 parts.
+ */
+static int block_error(const struct common *all, const double *g, double value, size_t skies, double *error)
+{
+    size_t n = FOM_PARTS * skies, used = 0;
+    double *sum = calloc(2 * n + 1, sizeof *sum), total = 0, var = 0;
+    if (!sum)
+        return E_NOMEM;
+    for (size_t i = 0; i < all->n; i++) {
+        sum[2 * all->block[i]] += all->r[i];
+        sum[2 * all->block[i] + 1] += g[i];
+        total += g[i];
+    }
+    for (size_t k = 0; k < n; k++) {
+        const double d = (sum[2 * k] - value * sum[2 * k + 1]) / (total - sum[2 * k + 1]);
+        used += sum[2 * k] != 0 || sum[2 * k + 1] != 0;
+        var += d * d;
+    }
+    *error = used >= 8 ? sqrt(var * (double)(used - 1) / (double)used) : NAN;
+    free(sum);
+    return OK;
+}
+
+static int ratios(struct fom_pairs *out, const struct common *all, size_t skies, long draws, uint64_t seed)
 {
     struct stats t;
     int st = stats_ratio(all->n, all->r, all->g, draws, seed, &out->scalar);
     if (st == OK)
         st = stats_ratio(all->n, all->r, all->p, 0, seed, &out->tensor);
+    if (st == OK)
+        st = block_error(all, all->g, out->scalar.value, skies, &out->scalar_block);
+    if (st == OK)
+        st = block_error(all, all->p, out->tensor.value, skies, &out->tensor_block);
     stats_sum(all->n, all->g, &t);
     out->response = t.mean;
     stats_sum(all->n, all->mean, &t);
@@ -274,7 +321,7 @@ int fom_pairs(size_t n, const struct fom_image *const *im, int component, int ps
               uint64_t seed, struct fom_pairs *out)
 {
     const struct ratio none = {.value = NAN, .se = NAN, .jackknife = NAN, .bootstrap = NAN};
-    struct fom_pairs r = {.scalar = none, .tensor = none, .response = NAN, .mean = NAN, .mean_se = NAN, .total = NAN,
+    struct fom_pairs r = {.scalar = none, .tensor = none, .scalar_block = NAN, .tensor_block = NAN, .response = NAN, .mean = NAN, .mean_se = NAN, .total = NAN,
                           .total_se = NAN, .selection = NAN, .selection_se = NAN};
     double var[2] = {0};
     struct sums sum[LEVELS] = {{0}};
@@ -298,7 +345,7 @@ int fom_pairs(size_t n, const struct fom_image *const *im, int component, int ps
         for (size_t j = 0; j < fields; j++)
             add_variance(var, sum, &f[j], component);
         means(&r, sum, var, f, fields);
-        st = ratios(&r, &all, draws, seed);
+        st = ratios(&r, &all, n, draws, seed);
     }
     for (size_t j = 0; j < fields; j++)
         field_free(&f[j]);
@@ -307,6 +354,7 @@ int fom_pairs(size_t n, const struct fom_image *const *im, int component, int ps
     free(all.g);
     free(all.p);
     free(all.mean);
+    free(all.block);
     if (st == OK)
         *out = r;
     return st;

@@ -22,6 +22,7 @@ struct fom_pairs {
     size_t common;            /* galaxies used in every image of the pairs */
     struct ratio scalar;      /* <r>/<G>, G = (P11 + P22)/2 of the same galaxies */
     struct ratio tensor;      /* <r>/<Pcc> */
+    double scalar_block, tensor_block;      /* errors of both by leaving out parts of the skies */
     double response;          /* <G> of the common galaxies */
     double mean, mean_se;     /* of (e+ + e-)/2: what remains at zero shear, with shape noise */
     double selection, selection_se;  /* of the mean e per unit shear; NaN without column CUT */

@@ -48,15 +48,23 @@ static void means(const struct noise *m, int n, const float *pix, double *mean, 
     }
 }
 
+/* Uniform numbers of n items; mirrored: 1 - u, as uniform as u. */
+static void uniforms(const struct noise *m, const struct rng *r, uint64_t item, int n, double *u)
+{
+    rng_uniform_run(r, item, 0, n, u);
+    for (int i = 0; i < n && m->mirror; i++)
+        u[i] = 1 - u[i];
+}
+
 static void draw(const struct job *j, struct noise_counts *c, uint64_t item, int n, float *pix)
 {
     const struct noise *m = j->m;
     double u[BLOCK], v[BLOCK];
     means(m, n, pix, v, c);
-    rng_uniform_run(&j->shot, item, 0, n, u);
+    uniforms(m, &j->shot, item, n, u);
     poisson_inverse_run(n, u, v, v);
     if (m->read_noise > 0) {
-        rng_uniform_run(&j->read, item, 0, n, u);
+        uniforms(m, &j->read, item, n, u);
         for (int i = 0; i < n; i++)
             v[i] += m->read_noise * rng_normal_inverse(u[i]);
     }

@@ -24,6 +24,7 @@ struct noise {
     double saturate;     /* electrons a pixel can show, > 0; INFINITY for no limit */
     double gain;         /* electron per output unit, > 0 */
     double subtract;     /* electrons taken off afterwards (mean of sky and dark), or 0 */
+    int mirror;          /* 1 - u in place of every uniform number u: the opposite noise */
 };
 
 /* Pixels that were not ordinary. */

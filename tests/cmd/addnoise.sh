@@ -72,6 +72,13 @@ addnoise --sky-rate 20 fifty.fits -o a.fits; addnoise --sky-rate 20 near.fits -o
 $F dump a.fits 0 | cut -d' ' -f3 >a.txt; $F dump b.fits 0 | cut -d' ' -f3 >b.txt
 between "correlation of their noise" "$(paste a.txt b.txt | awk '{ a += $1; b += $2; aa += $1 * $1; bb += $2 * $2; ab += $1 * $2 } END { print (ab - a * b / NR) / sqrt((aa - a * a / NR) * (bb - b * b / NR)) }')" 0.999 1
 
+# the opposite noise
+addnoise --sky-rate 20 --read-noise 3 --mirror fifty.fits -o c.fits; addnoise --sky-rate 20 --read-noise 3 fifty.fits -o a.fits
+$F dump a.fits 0 | cut -d' ' -f3 >a.txt; $F dump c.fits 0 | cut -d' ' -f3 >c.txt
+between "correlation of a noise with the opposite one" "$(paste a.txt c.txt | awk '{ a += $1; b += $2; aa += $1 * $1; bb += $2 * $2; ab += $1 * $2 } END { print (ab - a * b / NR) / sqrt((aa - a * a / NR) * (bb - b * b / NR)) }')" -1 -0.99
+near "its variance over the other's (60000 pixels: 5 sigma)" "$(paste a.txt c.txt | awk '{ a += $1; b += $2; aa += $1 * $1; bb += $2 * $2 } END { print (bb - b * b / NR) / (aa - a * a / NR) }')" 1 0.02
+near "keyword MIRROR" "$(card c.fits MIRROR)" 1 0
+
 # hard pixels
 $F make hard.fits 4 1 '(9**9**9/9**9**9, -30, 3e7, 9**9**9)[$x]' "$ex" "$bu" "$pc"
 addnoise --sky-rate 0.5 hard.fits -o t.fits 2>warn.txt

@@ -85,6 +85,13 @@ near "three scales: undefined" "$(col opt3.cat OPTSCALE | sort -u | grep -c nan)
 ok "five scales, least at the end of the range" fom opt0.04* opt0.05* opt0.06* opt0.07* -q --draws 0 -o opt4.cat
 near "least at the end: a minimum beyond it is not given" "$(col opt4.cat OPTSCALE | head -1 | awk '{ print ($1 == "nan" || $1 < 0.07) }')" 1 0
 
+# opposite noise: the same sky, other pairs
+for k in 0 1 4; do sed 's/^# Keyword: AREA = 4/&\n# Keyword: MIRROR = 1/' a$k >mirror$k; done
+ok "a sky under opposite noises" fom a0 a1 a4 mirror? -q -o mirror.cat
+near "opposite noises: one sky" "$(col mirror.cat NFIELDS)" 1 0
+near "opposite noises: pairs of both" "$(col mirror.cat NPAIR1)" 800 0
+near "no error by skies with one" "$(col mirror.cat B1JK | grep -c nan)" 1 0
+
 # undefined, exit 0, a warning
 shapes few0 few 0.10 0 0 1 3 9; shapes few1 few 0.10 0.05 0 1 3 9
 ok "three galaxies" fom few0 few1 -o few.cat

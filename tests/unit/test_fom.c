@@ -13,6 +13,8 @@ struct world {
     double m;                 /* bias put in */
     double sigma, noise;      /* intrinsic and measurement spread of e */
     double limit;             /* galaxies with e1 above are not used; 0: all are */
+    double hidden, jitter;    /* spreads of the response that P does not know: the galaxy's own; the noise's */
+    int opposite;             /* opposite noise: the jitter with the other sign */
     uint64_t seed;
 };
 
@@ -23,6 +25,7 @@ static struct fom_image image(const struct world *w, const double g[2], double s
     struct fom_image im = {.scale = scale, .g = {g[0], g[1]}, .area = 4, .count = {900, 890, 880, 870, 860}, .marked = 1, .n = w->n};
     snprintf(im.set, sizeof im.set, "sim");
     snprintf(im.field, sizeof im.field, "%s", field);
+    snprintf(im.sky, sizeof im.sky, "%s", field);
     im.object = calloc(w->n + 1, sizeof *im.object);
     for (size_t i = 0; i < w->n; i++) {
         struct fom_object *o = &im.object[i];
@@ -31,7 +34,8 @@ static struct fom_image image(const struct world *w, const double g[2], double s
         o->y = 2 * (double)(i / 100) + 0.3 * rng_uniform(&r, i, 2);
         for (int c = 0; c < 2; c++) {
             o->e[c] = w->sigma * rng_normal(&r, i, 3 + (uint32_t)c) + w->noise * rng_normal(&r, i, 5 + (uint32_t)c) +
-                      response * (1 + w->m) * g[c];
+                      response * (1 + w->m) * g[c] +
+                      g[c] * (w->hidden * rng_normal(&r, i, 7) + (w->opposite ? -1 : 1) * w->jitter * rng_normal(&r, i, 8));
             o->err[c] = w->noise;
             o->p[c] = response;
         }
@@ -103,7 +107,7 @@ static void matching(void)
     check_end(&c);
     /* the sky: 0.1" apart across RA 0, at declination 60 */
     struct fom_object p = {.x = 359.9999999, .y = 60}, q = {.x = 0.0000400, .y = 60};
-    struct fom_image ip = {.n = 1, .object = &p, .sky = 1}, iq = {.n = 1, .object = &q, .sky = 1};
+    struct fom_image ip = {.n = 1, .object = &p, .on_sky = 1}, iq = {.n = 1, .object = &q, .on_sky = 1};
     c = check_begin("the sky: 0.072 arcsec across RA = 0 at declination 60");
     check_close(&c, fom_match(&ip, &iq, 0.0730, to), OK, 0.1);
     check_close(&c, (double)to[0], 0, 0.1);
@@ -209,6 +213,58 @@ static void fields_and_lines(void)
     check_end(&c);
 }
 
+/* The same galaxies under two opposite noises: the error by parts of the sky against the scatter of worlds. */
+static void mirrored(void)
+{
+    enum { M = 100 };
+    struct fom_options o = standard;
+    o.draws = 0;
+    double s = 0, q = 0, se[3] = {0}, fit_se = 0, fit = 0, fit2 = 0;
+    for (int k = 0; k < M; k++) {
+        struct world w = {.n = 1000, .sigma = 0.25, .hidden = 0.3, .jitter = 0.5, .seed = 2000 + (uint64_t)k};
+        struct fom_image im[30];
+        const struct fom_image *p[30] = {0};
+        struct fom_result r = {0};
+        for (int f = 0, n = 0; f < 6; f++)
+            for (int i = 0; i < 5; i++, n++) {
+                char name[16];
+                snprintf(name, sizeof name, "f%d", f / 2);
+                w.opposite = f % 2;
+                im[n] = image(&w, shears[i], 0.1, name, (uint64_t)(f / 2));
+                if (w.opposite)
+                    strcat(im[n].field, "~");
+                p[n] = &im[n];
+            }
+        if (fom_group(30, p, &o, &r))
+            check_that(0, "fom_group failed");
+        s += r.v[FOM_BP1] / M;
+        q += r.v[FOM_BP1] * r.v[FOM_BP1] / M;
+        se[0] += r.v[FOM_BP1SE] / M;
+        se[1] += r.v[FOM_BP1BK] / M;
+        se[2] += r.v[FOM_BT1BK] / M;
+        fit_se += r.v[FOM_B1JK] * r.v[FOM_B1JK] / M;
+        fit += r.v[FOM_B1] / M;
+        fit2 += r.v[FOM_B1] * r.v[FOM_B1] / M;
+        if (k == 0)
+            check_that(r.fields == 3 && r.v[FOM_PAIRS1] == 6000, "three skies under two noises: %ld skies, %g pairs", r.fields, r.v[FOM_PAIRS1]);
+        fom_result_free(&r);
+        for (int i = 0; i < 30; i++)
+            fom_image_free(&im[i]);
+    }
+    const double scatter = sqrt(q - s * s);
+    printf("# scatter %.5f, by galaxies %.5f, by parts of the sky %.5f\n", scatter, se[0], se[1]);
+    struct check c = check_begin("opposite noises: error by parts of the sky = scatter of 100 worlds (known to 7 %; 4 sigma)");
+    check_close(&c, s, 1, 5 * scatter / sqrt(M));
+    check_close(&c, se[1] / scatter, 1, 0.28);
+    check_close(&c, se[2] / scatter, 1, 0.28);
+    check_close(&c, scatter, 0.3 / 1.3 / sqrt(3000), 0.28 * 0.3 / 1.3 / sqrt(3000));
+    check_end(&c);
+    check_that(se[0] > 1.1 * se[1], "the error by galaxies takes the two noises for independent ones and is larger here");
+    c = check_begin("the fit's error by leaving out skies = scatter of 100 worlds (three skies: one world's is known to 50 %; 4 sigma)");
+    check_close(&c, sqrt(fit_se / (fit2 - fit * fit)), 1, 0.35);
+    check_end(&c);
+}
+
 static void undefined(void)
 {
     struct world w = {.n = 3, .sigma = 0.25, .seed = 54};
@@ -234,6 +290,7 @@ int main(void)
     slopes();
     selection();
     fields_and_lines();
+    mirrored();
     undefined();
     return check_status();
 }
