@@ -149,7 +149,7 @@ static int describe(const struct work *w, struct plan *p, const char *record)
             st = header_set_bool(h, "SKYSUB", r->subtract || p->subtracted, "SKYLEVEL is subtracted");
     }
     if (st == OK)
-        st = header_set_str(h, "SEED", seed, "seed of the noise");
+        st = header_set_str(h, "NOISSEED", seed, "seed of the noise");
     if (st == OK && r->mirror)
         st = header_set_long(h, "MIRROR", 1, "the opposite noise of this seed");
     return st == OK ? header_history(h, record) : st;

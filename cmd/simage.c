@@ -172,7 +172,9 @@ static int describe(struct header *h, const struct input *in, const struct reque
     if (st == OK && seed)
         st = header_set_str(h, "SEED", seed, "seed of the scene list");
     if (st == OK && r->psf) {
-        st = header_set_str(h, "PSFFILE", in->psf.base, "PSF");
+        char what[32];
+        snprintf(what, sizeof what, in->psf.sum[0] ? "PSF; DATASUM %s" : "PSF", in->psf.sum);
+        st = header_set_str(h, "PSFFILE", in->psf.base, what);
         if (st == OK && isfinite(in->fwhm))
             st = header_set_double(h, "PSFFWHM", in->fwhm, "FWHM of PSF and charge diffusion, arcsec");
         if (st == OK)

@@ -141,6 +141,8 @@ int exposure_read(struct fits_in *f, const char *name, int index, struct exposur
     int st = fits_in_header(f, index, &new.hdr, e);
     if (st == OK)
         st = exposure_keywords(&new.hdr, label, &new, e);
+    if (st == OK)
+        st = fits_in_provenance(f, index, &new.hdr, e);
     if (st)
         header_free(&new.hdr);
     else

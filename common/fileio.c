@@ -59,11 +59,14 @@ int file_pwrite(int fd, const void *buf, size_t n, uint64_t offset)
     return 0;
 }
 
-ssize_t file_read(int fd, void *buf, size_t n)
+/* Until n bytes or the end, from the file's own position (at < 0) or from a given one. */
+static ssize_t read_all(int fd, void *buf, size_t n, int64_t at)
 {
     size_t got = 0;
     while (got < n) {
-        ssize_t k = read(fd, (char *)buf + got, n - got < most ? n - got : most);
+        size_t want = n - got < most ? n - got : most;
+        char *to = (char *)buf + got;
+        ssize_t k = at < 0 ? read(fd, to, want) : pread(fd, to, want, (off_t)at + (off_t)got);
         if (k < 0 && errno == EINTR)
             continue;
         if (k < 0)
@@ -75,21 +78,14 @@ ssize_t file_read(int fd, void *buf, size_t n)
     return (ssize_t)got;
 }
 
+ssize_t file_read(int fd, void *buf, size_t n)
+{
+    return read_all(fd, buf, n, -1);
+}
+
 ssize_t file_pread(int fd, void *buf, size_t n, uint64_t offset)
 {
-    size_t got = 0;
-    while (got < n) {
-        ssize_t k = pread(fd, (char *)buf + got, n - got < most ? n - got : most,
-                          (off_t)(offset + got));
-        if (k < 0 && errno == EINTR)
-            continue;
-        if (k < 0)
-            return -1;
-        if (k == 0)
-            break;
-        got += (size_t)k;
-    }
-    return (ssize_t)got;
+    return read_all(fd, buf, n, (int64_t)offset);
 }
 
 int file_split(const char *name, char **path, char **suffix)

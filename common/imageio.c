@@ -183,6 +183,19 @@ int fits_in_find(const struct fits_in *f, const char *extname, long extver)
     return -1;
 }
 
+int fits_in_datasum(const struct fits_in *f, int index, char sum[SUM_TEXT])
+{
+    char text[72];
+    const struct fits_unit *u = &f->unit[index];
+    if (header_str(&u->cards, u->compressed ? "ZDATASUM" : "DATASUM", text, sizeof text))
+        return 0;
+    size_t n = strspn(text, "0123456789");
+    if (n == 0 || n >= SUM_TEXT || text[n] || !strcmp(text, "0"))
+        return 0;
+    memcpy(sum, text, n + 1);
+    return 1;
+}
+
 int fits_in_header(struct fits_in *f, int index, struct header *h, struct err *e)
 {
     if (index < 0 || index >= f->n)
@@ -197,6 +210,16 @@ int fits_in_header(struct fits_in *f, int index, struct header *h, struct err *e
             return err_set(e, st, "%s: %s", source_name(f->src), err_text(st));
     }
     return OK;
+}
+
+int fits_in_provenance(const struct fits_in *f, int index, struct header *h, struct err *e)
+{
+    char sum[SUM_TEXT], line[SUM_TEXT + 16];
+    if (!fits_in_datasum(f, index, sum))
+        return OK;
+    snprintf(line, sizeof line, "read DATASUM %s", sum);
+    int st = header_history(h, line);
+    return st ? err_set(e, st, "%s: %s", source_name(f->src), err_text(st)) : OK;
 }
 
 /* ---- conversion: n big-endian values ---- */

@@ -53,6 +53,13 @@ int fits_in_find(const struct fits_in *f, const char *extname, long extver);
 /* Cards of an HDU without the structural ones, appended to an empty header. */
 MUST_CHECK int fits_in_header(struct fits_in *f, int index, struct header *h, struct err *e);
 
+/* The keyword DATASUM of an HDU (of the image within, when tile-compressed), where it has data: the
+ * decimal number as text, and 1; else 0.  fits_in_provenance appends it as a HISTORY line, so that a
+ * product names the very pixels that it came from. */
+enum { SUM_TEXT = 12 };
+int fits_in_datasum(const struct fits_in *f, int index, char sum[SUM_TEXT]);
+MUST_CHECK int fits_in_provenance(const struct fits_in *f, int index, struct header *h, struct err *e);
+
 /*
  * nrow rows from row y0 of plane z as float32 (BSCALE, BZERO applied; BLANK
  * becomes NaN), nx * nrow values.  Unsigned and 64-bit integers are converted

@@ -320,6 +320,8 @@ static int read_open(struct fits_in *f, const char *name, const struct psf_optio
     if (status == OK)
         status = inside(name, &h, o, info->scale, &made, e);
     info->fwhm = header_double_or(&h, "PSFFWHM", NAN);
+    if (!fits_in_datasum(f, index, info->sum))
+        info->sum[0] = 0;
     header_free(&h);
     if (status)
         otf_free(&made);

@@ -29,6 +29,7 @@ struct psf_info {
     double fwhm;           /* of what is in the file, arcsec; NaN when unknown */
     int from_otf;          /* the OTF extension was used */
     char base[72];         /* file name without folder */
+    char sum[12];          /* DATASUM of the HDU that was read; "" without one */
 };
 
 /*

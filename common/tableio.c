@@ -994,10 +994,12 @@ static int write_text(const struct table *t, const char *name, const char *recor
 static int write_fits(const struct table *t, const char *name, const char *record, const char *const *inputs,
                       size_t n_inputs, struct err *e)
 {
-    struct table copy;
+    struct table copy = {0};
     struct fits_out *f;
-    if (table_copy(&copy, t) || (record && table_history(&copy, record)))
+    if (table_copy(&copy, t) || (record && table_history(&copy, record))) {
+        table_free(&copy);
         return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
+    }
     int st = fits_out_open(&f, name, inputs, n_inputs, e);
     if (!st) {
         st = fits_out_hdu(f, -32, 0, 0, 1, NULL, e);

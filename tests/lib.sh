@@ -44,7 +44,7 @@ col() { awk -v n="$2" '/^#/ { line = $0; next } !c { k = split(line, h, " "); fo
 # key FILE NAME: a "# Keyword:" value of a text catalogue
 key() { sed -n "s/^# Keyword: $2 = //p" "$1" | head -1; }
 # card FILE NAME: the value of a FITS card of the primary header
-card() { fold -w80 "$1" | grep -a -m1 "^$(printf %-8s "$2")=" | sed "s/^.\{10\} *//; s/ *\/.*//; s/^'\(.*\)'$/\1/; s/ *$//"; }
+card() { fold -w80 "$1" | grep -a -m1 "^$(printf %-8s "$2")=" | sed "s/^.\{10\} *//; s/ *\/.*//; s/ *$//; s/^'\(.*\)'$/\1/; s/ *$//"; }
 # small_chain: one small file of each kind, from psf.fits to cut.txt
 small_chain() {
     psfgen --pupil-grid 64 --size 32 -o psf.fits

@@ -106,3 +106,11 @@ fails "output is the input" 1 addnoise fifty.fits -o fifty.fits
 [ ! -e no.fits ] && pass "no output left behind" || fail "a failed run left an output"
 ok "--check" addnoise --check --depth 27.7 flat.fits -o no.fits
 [ ! -e no.fits ] && pass "--check writes nothing" || fail "--check wrote"
+
+# the scene's seed stays, the noise's goes beside it, and the input is named by its sum
+$F make seeded.fits 8 8 50 "$pc" "$ex" "$bu" "$mz" "SEED    = '12      '"
+ok "noise on a scene of seed 12" addnoise -s 34 seeded.fits -o t.fits
+[ "$(card t.fits SEED) $(card t.fits NOISSEED)" = "12 34" ] && pass "SEED 12, NOISSEED 34" || fail "SEED $(card t.fits SEED), NOISSEED $(card t.fits NOISSEED)"
+ok "noise again" addnoise -s 35 t.fits -o u.fits
+sum=$(card t.fits DATASUM)
+[ -n "$sum" ] && grep -aq "HISTORY read DATASUM $sum " u.fits && pass "HISTORY names DATASUM $sum" || fail "HISTORY without DATASUM '$sum'"
