@@ -201,7 +201,7 @@ static int one_of(const struct header *h, struct table *t, const char *key)
 static void copy_keywords(struct table *t, const struct frame *f, const struct detect_params *p,
                           const struct detection *d)
 {
-    static const char *const keys[] = {"CCDSCALE", "EXPTIME", "TOTTIME", "SHEAR1", "SHEAR2", "SETNAME", "SEED",
+    static const char *const keys[] = {"CCDSCALE", "EXPTIME", "TOTTIME", "SHEAR1", "SHEAR2", "SETNAME", "SEED", "NOISSEED",
                                        "FIELDID", "EXPNUM", "PSFFWHM", "PSFFILE", "CHDIFF", "NOISECOR", "SKYLEVEL",
                                        "SKYSUB", "MIRROR", NULL};
     const struct header *h = &f->im.hdr;

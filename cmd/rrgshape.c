@@ -273,7 +273,7 @@ static void copy_keywords(struct table *t, const struct header *h)
 {
     static const char *const number[] = {"PIXSCALE", "CCDSCALE", "EXPTIME", "TOTTIME", "MAGZERO", "GAIN",
                                          "SHEAR1", "SHEAR2", "PSFFWHM", "NOISECOR", "MIRROR"};
-    static const char *const text[] = {"SETNAME", "SEED", "FIELDID"};
+    static const char *const text[] = {"SETNAME", "SEED", "NOISSEED", "FIELDID"};
     for (size_t k = 0; k < sizeof number / sizeof *number; k++) {
         double v;
         if (header_double(h, number[k], &v) == OK)

@@ -20,11 +20,11 @@ static int read_keywords(struct fom_image *im, const struct table *t, struct err
 {
     static const char *const count[5] = {"NDET", "NSTARCUT", "NELLCUT", "NSIZECUT", "NSNRCUT"};
     copy_word(im->set, table_text(t, "SETNAME"), "-");
-    double mirror;
     copy_word(im->sky, table_text(t, "FIELDID") ? table_text(t, "FIELDID") : table_text(t, "SEED"), "-");
-    memcpy(im->field, im->sky, sizeof im->field);
-    if (table_key_number(t, "MIRROR", &mirror) == OK && mirror > 0)
-        snprintf(im->field, sizeof im->field, "%.61s~", im->sky);
+    const char *noise = table_text(t, "NOISSEED");
+    double mirror;
+    int opposite = table_key_number(t, "MIRROR", &mirror) == OK && mirror > 0;
+    snprintf(im->field, sizeof im->field, "%s:%.40s%s", im->sky, noise ? noise : "", opposite ? "~" : "");
     for (int k = 0; k < 2; k++)
         if (table_key_number(t, k ? "SHEAR2" : "SHEAR1", &im->g[k]) != OK)
             return err_set(e, E_MISSING, "no keyword SHEAR%d: shapes must be measured on an image that has it", k + 1);

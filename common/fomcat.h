@@ -23,7 +23,7 @@ struct fom_object {
 struct fom_image {
     char set[64];             /* SETNAME */
     char sky[64];             /* FIELDID or SEED: images of one sky show the same galaxies */
-    char field[64];           /* the same, with a sign of its own for mirrored noise: one noise under all shears */
+    char field[112];          /* the same with NOISSEED, and a sign for MIRROR: one sky and noise under all shears */
     double scale;             /* CCDSCALE, arcsec */
     double g[2];              /* SHEAR1, SHEAR2 */
     double epsf[2];           /* EPSF1, EPSF2: ellipticity of the PSF; NaN: unknown */
