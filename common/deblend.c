@@ -45,11 +45,11 @@ struct part {              /* an object in the making: its core */
 struct deblend_work {
     struct pixel *pixel;
     int32_t *order, *queue;
-    float *level, *sorted;
+    float *level, *sorted, *line;
     struct peak *peak;
     struct branch *branch;
     struct part *part;
-    size_t cap_pixel, cap_order, cap_queue, cap_level, cap_sorted, cap_peak, cap_branch, cap_part;
+    size_t cap_pixel, cap_order, cap_queue, cap_level, cap_sorted, cap_peak, cap_branch, cap_part, cap_line;
     int32_t npixel, npeak, nbranch, npart;
 };
 
@@ -68,6 +68,7 @@ void deblend_work_free(struct deblend_work *w)
     free(w->queue);
     free(w->level);
     free(w->sorted);
+    free(w->line);
     free(w->peak);
     free(w->branch);
     free(w->part);
@@ -140,20 +141,67 @@ static int neighbours(const struct deblend_work *w, int32_t i, int32_t out[8])
     return n;
 }
 
-/* 1 when the filtered values have at least two local maxima. */
-static int has_two_maxima(const struct deblend_work *w)
+/* ---- maxima, straight from the runs ---- */
+
+/* The runs of one row, [begin, end), and their values at x0 - left + 1 of a line that is 0 elsewhere. */
+struct line {
+    float *v;
+    const struct run *begin, *end;
+};
+
+static struct line take_line(const struct segments *s, const struct run *from, const struct run *stop, int32_t left, float *v)
 {
-    int maxima = 0;
-    for (int32_t i = 0; i < w->npixel && maxima < 2; i++) {
-        int32_t near[8];
-        int n = neighbours(w, i, near), top = 1;
-        for (int k = 0; k < n && top; k++) {
-            float v = w->pixel[near[k]].v;
-            top = v < w->pixel[i].v || (!(v > w->pixel[i].v) && near[k] > i);
+    const struct run *r = from;
+    for (; r < stop && r->y == from->y; r++)
+        memcpy(v + (r->x0 - left + 1), s->smooth + r->at, (size_t)(r->x1 - r->x0) * sizeof *v);
+    return (struct line){v, from, r};
+}
+
+static void clear_line(struct line l, int32_t left)
+{
+    for (const struct run *r = l.begin; r < l.end; r++)
+        memset(l.v + (r->x0 - left + 1), 0, (size_t)(r->x1 - r->x0) * sizeof *l.v);
+}
+
+/* Local maxima of the line; of equal neighbours the last one in reading order counts. */
+static int count_maxima(struct line l, const float *up, const float *down, int32_t left)
+{
+    int n = 0;
+    for (const struct run *r = l.begin; r < l.end; r++)
+        for (int32_t i = r->x0 - left + 1; i <= r->x1 - left; i++) {
+            float v = l.v[i];
+            n += (up[i - 1] < v) & (up[i] < v) & (up[i + 1] < v) & (l.v[i - 1] < v) & (l.v[i + 1] <= v)
+                 & (down[i - 1] <= v) & (down[i] <= v) & (down[i + 1] <= v);
         }
-        maxima += top;
+    return n;
+}
+
+/* *several = 1 when the component's filtered values, all positive, have at least two local maxima. */
+static int several_maxima(const struct segments *s, size_t c, struct deblend_work *w, int *several)
+{
+    const struct run *first = s->run + s->first[c], *end = s->run + s->first[c + 1];
+    int32_t left = first->x0, right = first->x1;
+    for (const struct run *r = first; r < end; r++) {
+        left = r->x0 < left ? r->x0 : left;
+        right = r->x1 > right ? r->x1 : right;
     }
-    return maxima >= 2;
+    size_t wide = (size_t)(right - left) + 2;      /* not more than the pixels: they are connected */
+    int st = grow(&w->line, &w->cap_line, 3 * wide, sizeof *w->line);
+    if (st)
+        return st;
+    memset(w->line, 0, 3 * wide * sizeof *w->line);
+    struct line up = {w->line, first, first}, here = take_line(s, first, end, left, w->line + wide);
+    int n = 0;
+    for (float *free_line = w->line + 2 * wide; here.begin < end && n < 2;) {
+        struct line down = take_line(s, here.end, end, left, free_line);
+        n += count_maxima(here, up.v, down.v, left);
+        clear_line(up, left);
+        free_line = up.v;
+        up = here;
+        here = down;
+    }
+    *several = n >= 2;
+    return OK;
 }
 
 /* ---- the flood ---- */
@@ -512,22 +560,32 @@ void ellipse_axes(double xx, double xy, double yy, double *a, double *b, double 
         *theta = 90;
 }
 
+enum { FEW = 16 };
+
+/* The `room` largest values so far, from the largest; n of them. */
+struct largest {
+    long room, n;
+    float v[FEW];
+};
+
+static void largest_add(struct largest *t, float v)
+{
+    if (t->n == t->room && !(v > t->v[t->room - 1]))
+        return;
+    long j = t->n < t->room ? t->n++ : t->room - 1;
+    for (; j > 0 && t->v[j - 1] < v; j--)
+        t->v[j] = t->v[j - 1];
+    t->v[j] = v;
+}
+
 /* The k-th largest of the n values (k from 1); v is reordered. */
 static double kth_largest(float *v, long n, long k)
 {
-    enum { FEW = 16 };
-    float top[FEW + 1];
-    if (k <= FEW) {                        /* keep the k largest, sorted */
-        long m = 0;
-        for (long i = 0; i < n; i++) {
-            if (m == k && !(v[i] > top[k - 1]))
-                continue;
-            long j = m < k ? m++ : k - 1;
-            for (; j > 0 && top[j - 1] < v[i]; j--)
-                top[j] = top[j - 1];
-            top[j] = v[i];
-        }
-        return (double)top[k - 1];
+    if (k <= FEW) {
+        struct largest top = {.room = k};
+        for (long i = 0; i < n; i++)
+            largest_add(&top, v[i]);
+        return (double)top.v[k - 1];
     }
     long lo = 0, hi = n - 1, at = k - 1;
     while (lo < hi) {
@@ -578,14 +636,17 @@ static int find_margins(struct deblend_work *w, struct blob_list *out, size_t ba
 }
 
 /* Lowest threshold inside the component. */
-static double component_threshold(const struct deblend_work *w, const struct deblend_params *p)
+static double component_threshold(const struct segments *s, size_t c, const struct deblend_params *p)
 {
     if (!p->rms_map)
         return p->threshold;
     double low = INFINITY;
-    for (int32_t i = 0; i < w->npixel; i++) {
-        double t = p->threshold * (double)p->rms_map[(size_t)w->pixel[i].y * (size_t)p->nx + w->pixel[i].x];
-        low = t < low ? t : low;
+    for (size_t i = s->first[c]; i < s->first[c + 1]; i++) {
+        const float *rms = p->rms_map + (size_t)s->run[i].y * (size_t)p->nx;
+        for (int32_t x = s->run[i].x0; x < s->run[i].x1; x++) {
+            double t = p->threshold * (double)rms[x];
+            low = t < low ? t : low;
+        }
     }
     return low;
 }
@@ -613,46 +674,40 @@ static void share_moments(const struct deblend_work *w, int32_t first, const str
             add_moments(&blob[k], p->x, p->y, (double)p->v * light[k] / sum);
 }
 
-/* Sums of the labelled pixels; objects are numbered in the order of their parts. */
-static int measure(const struct segments *s, size_t c, const struct deblend_params *p,
-                   struct deblend_work *w, double threshold, int32_t first, int32_t *owner,
-                   struct blob_list *out)
+static const struct blob no_blob = {.xmin = INT32_MAX, .ymin = INT32_MAX, .xmax = -1, .ymax = -1, .peak = -INFINITY};
+
+/* Sums of the labelled pixels of at least two parts; objects are numbered in the order of their parts. */
+static int measure_parts(const struct segments *s, size_t c, const struct deblend_params *p,
+                         struct deblend_work *w, double threshold, int32_t first, int32_t *owner, struct blob_list *out)
 {
-    size_t base = out->n, parts = 1;
-    if (first >= 0) {                      /* rename sets to 0..parts-1 */
-        int st = grow(&w->queue, &w->cap_queue, (size_t)w->npart, sizeof *w->queue);
-        if (st)
-            return st;
-        parts = 0;
-        for (int32_t t = first; t >= 0; t = w->part[t].next)
-            w->queue[t] = (int32_t)parts++;
-    }
-    int st = grow(&out->blob, &out->cap, base + parts, sizeof *out->blob);
+    size_t base = out->n, parts = 0;
+    int st = grow(&w->queue, &w->cap_queue, (size_t)w->npart, sizeof *w->queue);
     if (st)
         return st;
-    for (size_t j = 0; j < parts; j++)
-        out->blob[base + j] = (struct blob){.xmin = INT32_MAX, .ymin = INT32_MAX, .xmax = -1, .ymax = -1,
-                                            .flags = parts > 1 ? DETECT_BLENDED : 0,
-                                            .peak = -INFINITY, .threshold = threshold};
+    for (int32_t t = first; t >= 0; t = w->part[t].next)   /* rename sets to 0..parts-1 */
+        w->queue[t] = (int32_t)parts++;
+    st = grow(&out->blob, &out->cap, base + parts, sizeof *out->blob);
+    if (st)
+        return st;
     size_t k = 0;
     for (int32_t t = first; t >= 0; t = w->part[t].next, k++) {
-        out->blob[base + k].x0 = (int32_t)w->part[t].x;
-        out->blob[base + k].y0 = (int32_t)w->part[t].y;
-        out->blob[base + k].core_x = w->part[t].x - out->blob[base + k].x0;
-        out->blob[base + k].core_y = w->part[t].y - out->blob[base + k].y0;
-    }
-    if (first < 0) {
-        out->blob[base].x0 = w->pixel[0].x;
-        out->blob[base].y0 = w->pixel[0].y;
+        struct blob *b = &out->blob[base + k];
+        *b = no_blob;
+        b->flags = DETECT_BLENDED;
+        b->threshold = threshold;
+        b->x0 = (int32_t)w->part[t].x;
+        b->y0 = (int32_t)w->part[t].y;
+        b->core_x = w->part[t].x - b->x0;
+        b->core_y = w->part[t].y - b->y0;
     }
     int32_t i = 0;
     for (size_t r = s->first[c]; r < s->first[c + 1]; r++)
         for (int32_t x = s->run[r].x0; x < s->run[r].x1; x++, i++) {
             size_t at = s->run[r].at + (size_t)(x - s->run[r].x0);
-            w->pixel[i].set = first >= 0 ? w->queue[w->pixel[i].set] : 0;
+            w->pixel[i].set = w->queue[w->pixel[i].set];
             struct blob *b = &out->blob[base + (size_t)w->pixel[i].set];
             add_pixel_to(b, x, s->run[r].y, (double)s->smooth[at], (double)s->value[at]);
-            if (parts > 1 && parts <= SHARERS && !w->pixel[i].core)
+            if (parts <= SHARERS && !w->pixel[i].core)
                 share_moments(w, first, &w->pixel[i], out->blob + base, parts);
             else
                 add_moments(b, x, s->run[r].y, (double)s->smooth[at]);
@@ -662,29 +717,41 @@ static int measure(const struct segments *s, size_t c, const struct deblend_para
     return find_margins(w, out, base, p->min_area);
 }
 
-/* A component as one object straight from its runs, without a copy of its pixels. */
-static int measure_whole(const struct segments *s, size_t c, const struct deblend_params *p, int32_t *owner,
-                         struct blob_list *out)
+/* A component as one object, straight from its runs. with_margin 0: so large an object is no wing of another. */
+static int measure_whole(const struct segments *s, size_t c, const struct deblend_params *p, double threshold,
+                         int with_margin, struct deblend_work *w, struct blob_list *out)
 {
     const struct run *first = &s->run[s->first[c]], *end = &s->run[s->first[c + 1]];
     int st = grow(&out->blob, &out->cap, out->n + 1, sizeof *out->blob);
     if (st)
         return st;
-    struct blob b = {.x0 = first->x0, .y0 = first->y, .xmin = INT32_MAX, .ymin = INT32_MAX, .xmax = -1, .ymax = -1,
-                     .flags = DETECT_UNSEPARATED, .peak = -INFINITY, .threshold = p->rms_map ? INFINITY : p->threshold};
-    for (const struct run *r = first; r < end && p->rms_map; r++)
-        for (int32_t x = r->x0; x < r->x1; x++) {
-            double t = p->threshold * (double)p->rms_map[(size_t)r->y * (size_t)p->nx + (size_t)x];
-            b.threshold = t < b.threshold ? t : b.threshold;
-        }
+    struct blob b = no_blob;
+    b.x0 = first->x0;
+    b.y0 = first->y;
+    b.threshold = threshold;
     for (const struct run *r = first; r < end; r++)
         for (int32_t x = r->x0; x < r->x1; x++) {
             size_t at = r->at + (size_t)(x - r->x0);
             add_pixel_to(&b, x, r->y, (double)s->smooth[at], (double)s->value[at]);
             add_moments(&b, x, r->y, (double)s->smooth[at]);
-            owner[at] = (int32_t)out->n;
         }
-    b.margin = b.smooth_peak - b.threshold;    /* so large an object is no wing of another */
+    b.margin = b.smooth_peak - threshold;
+    long k = p->min_area < b.n ? p->min_area : b.n;
+    if (with_margin && k <= FEW) {
+        struct largest top = {.room = k};
+        for (const struct run *r = first; r < end; r++)
+            for (const float *v = s->smooth + r->at, *stop = v + (r->x1 - r->x0); v < stop; v++)
+                largest_add(&top, *v);
+        b.margin = (double)top.v[k - 1] - threshold;
+    } else if (with_margin) {
+        st = grow(&w->sorted, &w->cap_sorted, (size_t)b.n, sizeof *w->sorted);
+        if (st)
+            return st;
+        float *to = w->sorted;
+        for (const struct run *r = first; r < end; to += r->x1 - r->x0, r++)
+            memcpy(to, s->smooth + r->at, (size_t)(r->x1 - r->x0) * sizeof *to);
+        b.margin = kth_largest(w->sorted, b.n, k) - threshold;
+    }
     out->blob[out->n++] = b;
     return OK;
 }
@@ -697,22 +764,28 @@ int deblend_component(const struct segments *s, size_t c, const struct deblend_p
     size_t size = 0;
     for (size_t i = s->first[c]; i < s->first[c + 1]; i++)
         size += (size_t)(s->run[i].x1 - s->run[i].x0);
-    if (p->most && size > p->most)
-        return measure_whole(s, c, p, owner, out);
-    int st = load(w, s, c);
+    double threshold = component_threshold(s, c, p);
+    if (p->most && size > p->most) {
+        int st = measure_whole(s, c, p, threshold, 0, w, out);
+        if (!st)
+            out->blob[out->n - 1].flags = DETECT_UNSEPARATED;
+        return st;
+    }
+    int32_t first = -1;
+    int st = OK, several = p->levels > 1 && p->contrast < 1 && size > 2 * (size_t)p->branch_area;
+    if (several)
+        st = several_maxima(s, c, w, &several);
+    if (!st && several) {
+        st = load(w, s, c);
+        if (!st) {
+            link_rows(w);
+            st = flood(w, p, threshold, &first);
+        }
+        if (!st && first >= 0)
+            st = share_pixels(w, first, p->levels);
+    }
     if (st)
         return st;
-    double threshold = component_threshold(w, p);
-    int32_t first = -1;
-    if (p->levels > 1 && p->contrast < 1 && w->npixel > 2 * p->branch_area) {
-        link_rows(w);
-        if (has_two_maxima(w)) {
-            st = flood(w, p, threshold, &first);
-            if (!st && first >= 0)
-                st = share_pixels(w, first, p->levels);
-        }
-    }
-    if (!st)
-        st = measure(s, c, p, w, threshold, first, owner, out);
-    return st;
+    return first < 0 ? measure_whole(s, c, p, threshold, 1, w, out)
+                     : measure_parts(s, c, p, w, threshold, first, owner, out);
 }

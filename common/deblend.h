@@ -59,8 +59,8 @@ MUST_CHECK int deblend_work_new(struct deblend_work **w);
 void deblend_work_free(struct deblend_work *w);
 
 /*
- * Split component c of s; append its objects to `out` and write for each of its
- * pixels owner[at] = index in `out`.
+ * Split component c of s; append its objects to `out`.  When they are several,
+ * write for each of its pixels owner[at] = index in `out`.
  */
 MUST_CHECK int deblend_component(const struct segments *s, size_t c, const struct deblend_params *p,
                                  struct deblend_work *w, int32_t *owner, struct blob_list *out);

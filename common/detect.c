@@ -120,7 +120,8 @@ static int filtered_noise(const struct image *im, const struct background *b, co
 struct split {
     const struct segments *s;
     const struct deblend_params *p;
-    int32_t *owner;            /* per detected pixel: object inside the task's list */
+    int32_t *owner;            /* per detected pixel of components that are split: object inside the task's list */
+    int32_t *whole;            /* per component: the object inside the task's list, -1: split */
     struct blob_list *list;    /* one per task */
 };
 
@@ -130,8 +131,12 @@ static int split_components(void *ctx, long begin, long end, int worker)
     struct split *t = ctx;
     struct deblend_work *w;
     int st = deblend_work_new(&w);
-    for (long c = begin; c < end && !st; c++)
-        st = deblend_component(t->s, (size_t)c, t->p, w, t->owner, &t->list[begin / COMPONENTS]);
+    struct blob_list *list = &t->list[begin / COMPONENTS];
+    for (long c = begin; c < end && !st; c++) {
+        size_t before = list->n;
+        st = deblend_component(t->s, (size_t)c, t->p, w, t->owner, list);
+        t->whole[c] = list->n == before + 1 ? (int32_t)before : -1;
+    }
     deblend_work_free(w);
     return st;
 }
@@ -157,18 +162,20 @@ static int join_lists(struct blob_list *all, struct blob_list *list, long n, siz
 }
 
 /* Labels from runs and their pixels' objects. number: the label of every object before cleaning. */
-static int label_runs(const struct image *im, const struct segments *s, const int32_t *owner, const size_t *base,
-                      const int32_t *number, struct labels *l)
+static int label_runs(const struct image *im, const struct split *t, const size_t *base, const int32_t *number,
+                      struct labels *l)
 {
+    const struct segments *s = t->s;
     size_t n = 0, cap = 0;
     struct label_run *run = NULL;
     int st = grow(&run, &cap, s->nrun + 1, sizeof *run);
     for (size_t i = 0; i < s->nrun && !st; i++) {
         const struct run *r = &s->run[i];
-        const int32_t *mine = owner + r->at, *of = number + base[r->component / COMPONENTS];
+        const int32_t *mine = t->owner + r->at, *of = number + base[r->component / COMPONENTS];
+        int32_t whole = t->whole[r->component];
         for (int32_t x = r->x0, end; x < r->x1 && !st; x = end) {
-            int32_t k = mine[x - r->x0];
-            for (end = x + 1; end < r->x1 && mine[end - r->x0] == k;)
+            int32_t k = whole >= 0 ? whole : mine[x - r->x0];
+            for (end = whole >= 0 ? r->x1 : x + 1; end < r->x1 && mine[end - r->x0] == k;)
                 end++;
             st = grow(&run, &cap, n + 1, sizeof *run);
             if (!st)
@@ -182,9 +189,8 @@ static int label_runs(const struct image *im, const struct segments *s, const in
 }
 
 /* Clean, number the objects that stay, pack their blobs, label their pixels. */
-static int settle(const struct image *im, const struct detect_params *p, const struct segments *s,
-                  const int32_t *owner, const size_t *base, struct blob_list *all,
-                  struct detection *d)
+static int settle(const struct image *im, const struct detect_params *p, const struct split *t, const size_t *base,
+                  struct blob_list *all, struct detection *d)
 {
     size_t n = all->n, kept = 0;
     int32_t *number = malloc((n + 1) * sizeof *number), *into = malloc((n + 1) * sizeof *into);
@@ -204,7 +210,7 @@ static int settle(const struct image *im, const struct detect_params *p, const s
         d->found = n;
         d->cleaned = n - kept;
         all->n = kept;
-        st = label_runs(im, s, owner, base, number, &d->label);
+        st = label_runs(im, t, base, number, &d->label);
     }
     free(number);
     free(into);
@@ -222,10 +228,10 @@ static int separate(const struct image *im, const float *map, const struct detec
         .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx,
         .most = image_count(im) / 8 > DETECT_MOST ? image_count(im) / 8 : DETECT_MOST
     };
-    struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)),
+    struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)), malloc((s->ncomponent + 1) * sizeof(int32_t)),
                           calloc((size_t)tasks + 1, sizeof(struct blob_list))};
     size_t *base = malloc(((size_t)tasks + 1) * sizeof *base);
-    int st = split.owner && split.list && base ? OK : E_NOMEM;
+    int st = split.owner && split.whole && split.list && base ? OK : E_NOMEM;
     if (!st)
         st = par_for((long)s->ncomponent, COMPONENTS, p->threads, split_components, &split);
     if (!st)
@@ -234,8 +240,9 @@ static int separate(const struct image *im, const float *map, const struct detec
         free(split.list[i].blob);
     free(split.list);
     if (!st)
-        st = settle(im, p, s, split.owner, base, all, d);
+        st = settle(im, p, &split, base, all, d);
     free(split.owner);
+    free(split.whole);
     free(base);
     return st;
 }
