@@ -4,6 +4,7 @@
  * Background on meshes, Gaussian matched filter, threshold, deblending,
  * cleaning, Kron photometry, star/galaxy class; a catalogue comes out.
  */
+#include "catkeys.h"
 #include "detect.h"
 #include "detectcat.h"
 #include "exposure.h"
@@ -186,27 +187,12 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
     return p;
 }
 
-static int one_of(const struct header *h, struct table *t, const char *key)
-{
-    char text[80];
-    double v;
-    if (header_double(h, key, &v) == OK)
-        return table_set_number(t, key, v);
-    if (header_str(h, key, text, sizeof text) == OK && *text && !strpbrk(text, "\r\n"))
-        return table_set_text(t, key, text);
-    return OK;
-}
-
 /* Keywords that the next programs need, and the HISTORY of the image. */
 static void copy_keywords(struct table *t, const struct frame *f, const struct detect_params *p,
                           const struct detection *d)
 {
-    static const char *const keys[] = {"CCDSCALE", "EXPTIME", "TOTTIME", "SHEAR1", "SHEAR2", "SETNAME", "SEED", "NOISSEED",
-                                       "FIELDID", "EXPNUM", "PSFFWHM", "PSFFILE", "CHDIFF", "NOISECOR", "SKYLEVEL",
-                                       "SKYSUB", "MIRROR", NULL};
-    const struct header *h = &f->im.hdr;
-    int st = OK;
-    if (f->scale > 0) {
+    int st = catkeys_copy(t, &f->im.hdr);
+    if (!st && f->scale > 0) {
         st = table_set_number(t, "PIXSCALE", f->scale);
         if (!st)
             st = table_set_number(t, "AREA", (double)image_count(&f->im) * f->scale * f->scale / 3600);
@@ -215,21 +201,12 @@ static void copy_keywords(struct table *t, const struct frame *f, const struct d
         st = table_set_number(t, "MAGZERO", f->zeropoint);
     if (!st && p->phot.gain > 0)
         st = table_set_number(t, "GAIN", p->phot.gain);
-    for (int i = 0; keys[i] && !st; i++)
-        st = one_of(h, t, keys[i]);
     if (!st)
         st = table_set_number(t, "SKYRMS", d->noise);
     if (!st)
         st = table_set_number(t, "THRESH", d->threshold * d->noise);
-    for (size_t i = 0; i < h->n && !st; i++)
-        if (strncmp(h->card[i], "HISTORY ", 8) == 0) {
-            char line[81];
-            snprintf(line, sizeof line, "%s", h->card[i] + 8);
-            for (size_t k = strlen(line); k > 0 && line[k - 1] == ' '; k--)
-                line[k - 1] = 0;
-            if (*line)
-                st = table_history(t, line);
-        }
+    if (!st)
+        st = catkeys_history(t, &f->im.hdr);
     run(st, "keywords");
 }
 

@@ -2,6 +2,7 @@
  * rrgshape.c - shapes of the objects of a catalogue: weighted moments, PSF
  * correction, ellipticity and response to shear.
  */
+#include "catkeys.h"
 #include "err.h"
 #include "imageio.h"
 #include "opt.h"
@@ -268,24 +269,6 @@ static struct starmom *find_psf(struct starmom *s, const struct input *in, const
     return s;
 }
 
-/* What the image knows wins over what the catalogue says: it may be another image than the detection's. */
-static void copy_keywords(struct table *t, const struct header *h)
-{
-    static const char *const number[] = {"PIXSCALE", "CCDSCALE", "EXPTIME", "TOTTIME", "MAGZERO", "GAIN",
-                                         "SHEAR1", "SHEAR2", "PSFFWHM", "NOISECOR", "MIRROR"};
-    static const char *const text[] = {"SETNAME", "SEED", "NOISSEED", "FIELDID"};
-    for (size_t k = 0; k < sizeof number / sizeof *number; k++) {
-        double v;
-        if (header_double(h, number[k], &v) == OK)
-            check(table_set_number(t, number[k], v), number[k]);
-    }
-    for (size_t k = 0; k < sizeof text / sizeof *text; k++) {
-        char v[72];
-        if (header_str(h, text[k], v, sizeof v) == OK)
-            check(table_set_text(t, text[k], v), text[k]);
-    }
-}
-
 /* Size of a star, and the ellipticity of the PSF under a weight of 0.25 arcsec, that of a galaxy. */
 static void set_psf(struct table *t, const struct starmom *s, double own, double scale)
 {
@@ -346,7 +329,7 @@ static void measure_objects(struct input *in, const struct params *p, const stru
     if (st == E_DATA)
         die(EXIT_RUN, "%s: a column with the name of a shape column is of another type", c->argv[1]);
     check(st, c->argv[1]);
-    copy_keywords(&in->cat, &in->hdr);
+    check(catkeys_copy(&in->cat, &in->hdr), "keywords");
     if (psf)
         set_psf(&in->cat, psf, own, in->scale);
     if (c->verbose)
@@ -371,7 +354,7 @@ static void measure_curve(struct input *in, const struct params *p, const struct
         check(table_set_text(out, in->cat.key[i].name, in->cat.key[i].value), c->argv[1]);
     for (size_t i = 0; i < in->cat.nhistory; i++)
         check(table_history(out, in->cat.history[i]), c->argv[1]);
-    copy_keywords(out, &in->hdr);
+    check(catkeys_copy(out, &in->hdr), "keywords");     /* the image knows better than the catalogue of another image */
     set_psf(out, &s, own, in->scale);
     if (c->verbose)
         warn("%s: %ld stars, d* = %.4f px at w = %.3f px", c->argv[1], s.stars[0], s.dstar, s.dstar_w);

@@ -11,6 +11,7 @@
 #include "imageio.h"
 #include "models.h"
 #include "opt.h"
+#include "outfile.h"
 #include "plan.h"
 #include "progress.h"
 #include "psf.h"
@@ -20,6 +21,7 @@
 #include "sky.h"
 #include "table.h"
 #include "tableio.h"
+#include "truth.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +31,7 @@
 
 /* What the user asks for. */
 struct request {
-    const char *models, *psf, *set;
+    const char *models, *psf, *set, *truth;
     double pixel;            /* arcsec, of the detector */
     double size[2];          /* output pixels; 0: from the list's FIELD */
     double shear[2];
@@ -66,6 +68,8 @@ static void check_options(const struct request *r, const struct opt *own, const 
     for (const char *p = r->set; p && *p; p++)
         if (*p <= ' ' || *p > '~')
             die(EXIT_USAGE, "--set '%s': one word of printable ASCII is needed, catalogues carry it", r->set);
+    if (r->truth && outfile_same(r->truth, c->out))
+        die(EXIT_USAGE, "--truth and --output cannot both be %s", strcmp(c->out, "-") ? c->out : "standard output");
     if (!opt_given(own, c, "pixscale"))
         die(EXIT_USAGE, "how large are the pixels? Give -x ARCSEC");
     if (!(hypot(r->shear[0], r->shear[1]) < 1))
@@ -313,6 +317,17 @@ static void make_image(struct image *im, const struct view *v)
     im->hdr = h;
 }
 
+/* What is in the image, beside it. */
+static void write_truth(struct input *in, const struct request *r, const struct common *c, const struct header *h,
+                        const double *x, const double *y, const char *record)
+{
+    const char *inputs[] = {c->argv[0], r->models ? r->models : c->argv[0], r->psf ? r->psf : c->argv[0]};
+    struct err e;
+    check(truth_add(&in->list, &in->scene, h, x, y, r->exptime));
+    if (table_write(&in->list, r->truth, record, inputs, 3, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
 static void run(const struct request *r, const struct common *c, const char *record)
 {
     struct input in = {0};
@@ -337,6 +352,8 @@ static void run(const struct request *r, const struct common *c, const char *rec
     check(st);
     if (!r->whole)
         make_plan(&plan, &v, r, c, &emission);
+    if (r->truth && !c->check)
+        write_truth(&in, r, c, &im.hdr, x, x + in.scene.n, record);
     scene_free(&in.scene);
     table_free(&in.list);
     free(x);
@@ -391,6 +408,7 @@ int main(int argc, char **argv)
         {"pixel", 0, OPT_PAIR, r.box, 1e-9, 1e6, "W,H", "sides of the pixel's response, arcsec", 0, 0},
         {"center", 0, OPT_PAIR, r.centre, -360, 360, "RA,DEC", "sky position of the field centre, deg", 0, 0},
         {"set", 0, OPT_STR, &r.set, 0, 0, "NAME", "name of the set, keyword SETNAME", 0, 0},
+        {"truth", 0, OPT_STR, &r.truth, 0, 0, "FILE", "write the list with position and flux in the image", 0, 1},
         {"psf-scale", 0, OPT_REAL, &r.psf_options.scale, 1e-9, 1e6, "ARCSEC", "sampling of the PSF, over its header", 0, 0},
         {"psf-cutoff", 0, OPT_REAL, &r.psf_options.cutoff, 1e-9, 1e9, "U", "its highest frequency, cycles/arcsec", 0, 0},
         {"psf-has-pixel", 0, OPT_FLAG, &r.psf_options.has_pixel, 0, 0, 0, "the PSF contains the pixel", 0, 0},

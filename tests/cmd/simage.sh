@@ -248,3 +248,16 @@ printf '# DX DY MAG FLUX TYPE\n0 0 20 5 star\n' >both.txt
 fails "MAG and FLUX" 1 simage both.txt -x 0.1 --size 16,16 -o x.fits
 printf '# DX DY MAG TYPE\n0 0 20 star\n' >one.txt
 fails "a name of two words" 2 simage one.txt -x 0.1 --size 16,16 --set 'a b' -o x.fits
+
+# the truth beside the image: where detect finds a lone star, and how bright
+printf '%s\n' "# ID DX DY MAG TYPE NOTE" "7 1.23 -0.47 20 star mine" >truth.txt
+ok "--truth" simage truth.txt -p soft.fits -x 0.1 --size 101,101 --shear 0.03,0 --truth t.cat -o t.fits
+near "--truth: X_IMAGE" "$(col t.cat X_IMAGE)" 63.3 1e-9
+near "--truth: Y_IMAGE" "$(col t.cat Y_IMAGE)" 46.3 1e-9
+near "--truth: FLUX_IMAGE" "$(col t.cat FLUX_IMAGE)" "$(awk 'BEGIN { printf "%.9f", 2000 * 10 ^ (-0.4 * (20 - 26.65)) }')" 1e-3
+addnoise -q --depth 27.7 t.fits | detect - -q -o d.cat
+near "--truth: ALPHA_J2000, arcsec" "$(awk -v a="$(col t.cat ALPHA_J2000)" -v b="$(col d.cat ALPHA_J2000)" 'BEGIN { print (a - b) * 3600 }')" 0 0.005
+near "--truth: DELTA_J2000, arcsec" "$(awk -v a="$(col t.cat DELTA_J2000)" -v b="$(col d.cat DELTA_J2000)" 'BEGIN { print (a - b) * 3600 }')" 0 0.005
+same "--truth: other columns stay" <(col t.cat NOTE) <(echo mine)
+grep -q '^# Keyword: SHEAR1 = 0.03$' t.cat && pass "--truth: keywords of the image" || fail "--truth: no SHEAR1"
+fails "--truth over the output" 2 simage truth.txt -p soft.fits -x 0.1 --size 101,101 --truth t.fits -o t.fits
