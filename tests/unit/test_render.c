@@ -1,40 +1,18 @@
 /*
- * test_render.c - scenes: error requested against error found (stamps four times
- * larger, all frequencies, exact shear), same bytes for any number of threads,
- * paths that make no transform, and objects in strange places.
+ * test_render.c - scenes: same bytes for any number of threads, paths that make no
+ * transform, the series of the shear, Sersic profiles, and objects in strange places.
+ * Error requested against error found: test_requests.c.
  */
 #include "check.h"
 #include "emit.h"
-#include "fft.h"
-#include "pupil.h"
 #include "render.h"
-#include "rng.h"
+#include "scenes.h"
 #include "shapelet.h"
-#include "shear.h"
-#include "tableio.h"
 #include <stdlib.h>
 #include <string.h>
 
-#define PI 3.14159265358979323846
-
-static double uniform(int i, int k)
-{
-    const struct rng r = rng_stream(5, 0, RNG_TEST);
-    return rng_uniform(&r, (uint64_t)i, (uint32_t)k);
-}
-
-/* The default telescope: 2 m, obscuration 0.3, three vanes, 820 nm. */
-static void telescope(struct otf *t)
-{
-    struct pupil p = telescope_preset(0)->pupil;
-    struct err e = {""};
-    if (pupil_otf(&p, 128, t, &e)) {
-        printf("not ok - %s\n", e.text);
-        exit(1);
-    }
-    if (!t->sre && otf_spline(t))
-        exit(1);
-}
+static struct image render(const struct view *v, double eps, int n, const struct emitter *s, int threads, struct plan *kept);
+static double sum_of(const struct image *im);
 
 /* n galaxies with counts, sizes and orders like those of deep fields, and every tenth a star. */
 static struct emitter *field(int n, long side)
@@ -70,186 +48,6 @@ static void field_free(struct emitter *s, int n)
     for (int i = 0; i < n; i++)
         free((double *)(uintptr_t)s[i].coef);
     free(s);
-}
-
-/* Exact map of one object: coefficients after parity and rotation, and the product of both shears. */
-static int exact_shape(const struct view *v, const struct emitter *s, double *tmp, double *c, struct shape *shape)
-{
-    double own[4], all[4];
-    *shape = (struct shape){.nmax = s->nmax, .beta_x = s->beta * s->dilation, .beta_y = s->beta * s->dilation};
-    if (!s->coef)
-        return OK;
-    for (size_t i = 0; i < shapelet_count(s->nmax); i++)
-        tmp[i] = s->coef[i] / s->dilation;
-    if (s->parity < 0)
-        shapelet_mirror(s->nmax, tmp);
-    int st = shapelet_rotate(s->nmax, s->rotation, tmp, c);
-    if (!st)
-        st = shear_matrix(s->g1, s->g2, own);
-    if (!st)
-        st = shear_matrix(v->g1, v->g2, all);
-    shape->coef = c;
-    shape->mapped = 1;
-    shape->a[0] = all[0] * own[0] + all[1] * own[2];
-    shape->a[1] = all[0] * own[1] + all[1] * own[3];
-    shape->a[2] = all[2] * own[0] + all[3] * own[2];
-    shape->a[3] = all[2] * own[1] + all[3] * own[3];
-    return st;
-}
-
-static struct image render(const struct view *v, double eps, int n, const struct emitter *s, int threads, struct plan *kept);
-static double sum_of(const struct image *im);
-
-struct result {
-    double median, worst, share;   /* of |error| / tolerance; share within the tolerance */
-};
-
-static int rising(const void *a, const void *b)
-{
-    double x = *(const double *)a, y = *(const double *)b;
-    return x < y ? -1 : x > y;
-}
-
-/* Worst pixel error of object i over the tolerance, against a stamp `wide` pixels across. */
-static double error_of(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, int wide, double *big,
-                       double *small)
-{
-    const struct view *v = &p->view;
-    const struct draw *d = &p->draw[i];
-    struct shape shape;
-    static double tmp[200], c[200];
-    const int shift = (wide - d->nx) / 2;
-    if (scene_stamp(p, i, w, scratch, small) || exact_shape(v, &p->emitter[i], tmp, c, &shape))
-        return NAN;
-    const double x = p->emitter[i].x - d->x0 + shift, y = p->emitter[i].y - d->y0 + shift;
-    int st = OK, height = wide;
-    if (v->psf) {
-        struct stamp_grid g;
-        const struct stamp_response r = {.diffusion = v->diffusion, .box = v->pixel};
-        st = stamp_grid_new(&g, v->psf, &r, v->pixel, wide);
-        if (!st)
-            st = stamp_fourier(&g, w, &shape, x, y, p->emitter[i].flux, 1e9, big);
-        stamp_grid_free(&g);
-    } else if (shape.coef) {
-        st = stamp_mapped(w, &shape, v->pixel, v->pixel, wide, wide, x, y, p->emitter[i].flux, big);
-    } else {
-        stamp_point(wide, wide, x, y, p->emitter[i].flux, big);
-    }
-    if (st)
-        return NAN;
-    double peak = 0, worst = 0;
-    for (int k = 0; k < wide * height; k++)
-        peak = fmax(peak, fabs(big[k]));
-    for (int j = 0; j < height; j++)
-        for (int k = 0; k < wide; k++) {
-            int a = k - shift, b = j - shift;
-            int in = a >= 0 && b >= 0 && a < d->nx && b < d->ny;
-            worst = fmax(worst, fabs(big[j * wide + k] - (in ? small[b * d->nx + a] : 0)));
-        }
-    return worst / fmax(p->acc.eps * peak, p->acc.floor);
-}
-
-static struct result requested(const struct view *v, double eps, double floor, int n, const struct emitter *s)
-{
-    struct accuracy a = ACCURACY_DEFAULT;
-    struct plan p;
-    struct stamp_work *w;
-    struct result r = {NAN, NAN, 0};
-    a.eps = eps;
-    a.floor = floor;
-    if (scene_plan(&p, v, &a, (size_t)n, s) || stamp_work_new(&w))
-        return r;
-    double *scratch = malloc((3 * plan_scratch(&p) + 1) * sizeof *scratch), *e = malloc((size_t)n * sizeof *e);
-    const size_t room = 2304u * 2304u;
-    double *big = fft_alloc(room * sizeof *big), *small = fft_alloc(room / 4 * sizeof *small);
-    int m = 0, good = 0;
-    for (int i = 0; i < n; i++) {
-        const struct draw *d = &p.draw[i];
-        if (d->path == PATH_NONE)
-            continue;
-        int wide = v->psf ? (d->nx > 400 ? 2 : 4) * d->nx : 2 * d->nx + 9 + d->nx % 2;
-        wide = (v->psf || wide % 2 == d->nx % 2) ? wide : wide + 1;
-        if (!v->psf && (d->nx != d->ny || wide > 400))
-            continue;
-        e[m] = error_of(&p, (size_t)i, w, scratch, wide, big, small);
-        good += e[m] <= 1;
-        m += 1;
-    }
-    qsort(e, (size_t)m, sizeof *e, rising);
-    r = (struct result){e[m / 2], e[m - 1], (double)good / m};
-    for (int i = 0; i < m; i++)
-        if (!(e[i] == e[i]))
-            r.worst = NAN;
-    free(scratch);
-    free(e);
-    fft_free(big);
-    fft_free(small);
-    stamp_work_free(w);
-    plan_free(&p);
-    return r;
-}
-
-static void accuracy(const struct otf *t)
-{
-    static const struct { double pixel, eps, floor; int psf, n; } job[] = {
-        {0.10, 1e-2, 0, 1, 150}, {0.10, 1e-3, 0, 1, 150}, {0.10, 1e-4, 0, 1, 100}, {0.10, 1e-5, 0, 1, 40},
-        {0.10, 1e-7, 0.1, 1, 150}, {0.16, 1e-4, 0, 1, 60}, {0.05, 1e-3, 0, 1, 60}, {0.10, 1e-4, 0, 0, 100},
-        {0.10, 1e-8, 0, 0, 60}};
-    for (size_t i = 0; i < sizeof job / sizeof *job; i++) {
-        struct view v = {.nx = 300, .ny = 300, .pixel = job[i].pixel, .diffusion = job[i].psf ? 0.04 : 0,
-                         .psf = job[i].psf ? t : NULL, .g1 = 0.03, .g2 = 0.04};
-        struct emitter *s = field(job[i].n, 300);
-        struct result r = requested(&v, job[i].eps, job[i].floor, job[i].n, s);
-        check_that(r.share >= 0.99 && r.worst <= 3,
-                   "%s, %.2f\", accuracy %g, floor %g: error / tolerance median %.2g, worst %.2g, %.1f %% within",
-                   job[i].psf ? "PSF" : "no PSF", v.pixel, job[i].eps, job[i].floor, r.median, r.worst, 100 * r.share);
-        field_free(s, job[i].n);
-    }
-}
-
-/* Real galaxies: every model of the HDF catalogue, turned, mirrored, at several magnitudes. */
-static void library(const struct otf *t)
-{
-    static const struct { double pixel, eps, floor; int psf, step; } job[] = {
-        {0.10, 1e-2, 0, 1, 1}, {0.10, 1e-3, 0, 1, 1}, {0.10, 1e-4, 0, 1, 2}, {0.16, 1e-5, 0, 1, 13}, {0.16, 1e-6, 0, 1, 41},
-        {0.10, 1e-7, 0.1, 1, 1}, {0.04, 1e-7, 0.1, 1, 3}, {0.10, 1e-7, 0, 0, 1}, {0.24, 1e-3, 0, 1, 2}};
-    const char *shared = getenv("SHARED");
-    char name[512];
-    struct table list = {0};
-    struct models m = {0};
-    struct err e = {""};
-    snprintf(name, sizeof name, "%s/data/hdf/hdfn_shapelets.txt", shared ? shared : "");
-    if (!shared || table_read(&list, name, 1e9, &e)) {
-        check_skip("data/hdf is not there");
-        return;
-    }
-    if (!check_that(models_open(&m, &list, name, &e) == OK, "HDF models are read"))
-        return;
-    const int n = (int)m.n * 5;
-    struct emitter *all = calloc((size_t)n, sizeof *all), *s = calloc((size_t)n, sizeof *s);
-    for (int i = 0; i < n; i++) {
-        size_t k = (size_t)i % m.n;
-        all[i] = (struct emitter){.x = 150 + uniform(i, 0), .y = 150 + uniform(i, 1), .flux = 2000 * pow(10, 0.4 * (26.65 - 21 - 9 * uniform(i, 2))),
-                                  .coef = m.coef + m.offset[k], .nmax = m.nmax[k], .beta = m.beta[k], .parity = i % 2 ? 1 : -1,
-                                  .rotation = 6.28 * uniform(i, 3), .dilation = 0.6 + 0.8 * uniform(i, 4)};
-        if (i % 9 == 0)
-            all[i].coef = NULL;
-    }
-    for (size_t j = 0; j < sizeof job / sizeof *job; j++) {
-        struct view v = {.nx = 300, .ny = 300, .pixel = job[j].pixel, .diffusion = job[j].psf ? 0.04 : 0,
-                         .psf = job[j].psf ? t : NULL, .g1 = -0.03, .g2 = 0.04};
-        int k = 0;
-        for (int i = 0; i < n; i += job[j].step)
-            s[k++] = all[i];
-        struct result r = requested(&v, job[j].eps, job[j].floor, k, s);
-        check_that(r.share >= 0.99 && r.worst <= 3,
-                   "HDF, %s, %.2f\", accuracy %g, floor %g, %d objects: error / tolerance median %.2g, worst %.2g, %.1f %% within",
-                   job[j].psf ? "PSF" : "no PSF", v.pixel, job[j].eps, job[j].floor, k, r.median, r.worst, 100 * r.share);
-    }
-    free(all);
-    free(s);
-    models_free(&m);
-    table_free(&list);
 }
 
 /* Light of a Sersic profile inside r (RE = 1), P(2n, b r^(1/n)), by its series. */
@@ -457,8 +255,6 @@ int main(void)
     strange(&t);
     sersic();
     extremes(&t);
-    accuracy(&t);
-    library(&t);
     otf_free(&t);
     return check_status();
 }

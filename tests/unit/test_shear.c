@@ -279,6 +279,53 @@ static void test_series(void)
                && shear_series(2, c, 1, 0, 4, out) == E_RANGE && shear_series(2, c, NAN, 0, 4, out) == E_RANGE && out[0] == 7, "series: domain");
 }
 
+/* One unit in the last digit of a number written like 3.7e-3 or 0.25. */
+static double last_digit(const char *s)
+{
+    const char *e = strchr(s, 'e'), *point = strchr(s, '.');
+    const int digits = point ? (int)(e ? e - point : (long)strlen(point)) - 1 : 0;
+    return pow(10, (e ? atoi(e + 1) : 0) - digits);
+}
+
+/*
+ * Truncation error of the series in L2, full growth, direction 2 phi = 0.7, worst of |n,0> and |n/2,n/2>: table of the
+ * reference (simulation-math.md, 5), orders 1 2 3 4 6 8, to its last printed digit.
+ */
+static void test_series_table(void)
+{
+    static const int orders[] = {1, 2, 3, 4, 6, 8};
+    static const struct { int n; double gamma; const char *error[6]; } row[] = {
+        {0, 0.05, {"2.8e-3", "1.6e-4", "9.7e-6", "5.8e-7", "2e-9", "8e-12"}}, {2, 0.05, {"8.3e-3", "6.6e-4", "4.9e-5", "3.6e-6", "2e-8", "9e-11"}},
+        {8, 0.05, {"4.9e-2", "7.1e-3", "8.9e-4", "1.0e-4", "1e-6", "9e-9"}},  {12, 0.05, {"9.8e-2", "1.9e-2", "3.1e-3", "4.4e-4", "7e-6", "8e-8"}},
+        {20, 0.05, {"0.25", "7.4e-2", "1.8e-2", "3.7e-3", "1e-4", "2e-6"}},   {2, 0.1, {"3.3e-2", "5.2e-3", "7.9e-4", "1.1e-4", "2e-6", "4e-8"}},
+        {12, 0.1, {"0.38", "0.15", "4.9e-2", "1.4e-2", "8e-4", "4e-5"}},      {20, 0.1, {"0.93", "0.56", "0.28", "0.11", "1.4e-2", "1e-3"}},
+        {2, 0.3, {"0.28", "0.13", "6e-2", "2.6e-2", "5e-3", "8e-4"}},         {12, 0.3, {"2.6", "3.2", "3.2", "2.8", "1.6", "0.7"}},
+        {2, 0.5, {"0.72", "0.56", "0.42", "0.31", "0.15", "7e-2"}},           {12, 0.5, {"4.4", "10", "18", "28", "46", "57"}}};
+    static double c[231], out[2278], exact[2278];
+    struct check k = check_begin("series: table of truncation errors, orders 1 to 8, gamma .05 to .5, n 0 to 20");
+    for (size_t r = 0; r < sizeof row / sizeof *row; r++)
+        for (int o = 0; o < 6; o++) {
+            const int n = row[r].n, nout = n + 2 * orders[o];
+            const double g = tanh(row[r].gamma), g1 = g * cos(0.7), g2 = g * sin(0.7);
+            double worst = 0;
+            for (int state = 0; state < 2; state++) {
+                memset(c, 0, sizeof c);
+                c[shapelet_index(state ? n / 2 : n, state ? n / 2 : 0)] = 1;
+                if (shear_series(n, c, g1, g2, orders[o], out) || shear_exact(n, c, g1, g2, 66, exact))
+                    check_that(0, "series refuses");
+                double d2 = 0, beyond = 1;   /* power of the exact one above order 66 */
+                for (size_t i = 0; i < shapelet_count(66); i++) {
+                    const double d = (i < shapelet_count(nout) ? out[i] : 0) - exact[i];
+                    d2 += d * d;
+                    beyond -= exact[i] * exact[i];
+                }
+                worst = fmax(worst, sqrt(d2 + (beyond > 1e-13 ? beyond : 0)));
+            }
+            check_close(&k, worst, atof(row[r].error[o]), 0.5 * last_digit(row[r].error[o]));
+        }
+    check_end(&k);
+}
+
 static void test_grid(void)
 {
     static double c[1891], even[70 * 3], odd[70 * 3], all[70 * 3], x[3] = {-0.8, 0.3, 1.9}, y[70], half[1891];
@@ -479,6 +526,7 @@ int main(void)
     test_exact();
     test_growth();
     test_series();
+    test_series_table();
     test_grid();
     test_pixels();
     truth_squeeze();
