@@ -4,8 +4,10 @@
  * Noise-free: addnoise draws.  The positions of the list are not sheared; the
  * shapes are, about each object's origin.
  */
+#include "distort.h"
 #include "emit.h"
 #include "err.h"
+#include "exposure.h"
 #include "field.h"
 #include "image.h"
 #include "imageio.h"
@@ -31,7 +33,7 @@
 
 /* What the user asks for. */
 struct request {
-    const char *models, *psf, *set, *truth;
+    const char *models, *psf, *set, *truth, *wcs;
     double pixel;            /* arcsec, of the detector */
     double size[2];          /* output pixels; 0: from the list's FIELD */
     double shear[2];
@@ -39,8 +41,8 @@ struct request {
     long subpixel;
     double exptime, zeropoint;
     double diffusion, jitter, ipc;
-    double box[2];           /* arcsec, of the pixel's response; 0: the pixel */
-    double centre[2];        /* deg */
+    double box[2], edge[2];  /* arcsec, of the pixel's response; 0: the pixel, no edges */
+    double centre[2];        /* deg; NaN: the middle that --wcs says */
     int no_pixel;
     int whole;               /* --method field */
     struct psf_options psf_options;
@@ -55,6 +57,9 @@ struct input {
     struct otf otf;
     struct psf_info psf;
     double fwhm;             /* of PSF, jitter and diffusion, arcsec; NaN without a PSF */
+    struct header wcs;       /* of --wcs, and the size of its image */
+    struct sky *sky;
+    long nx, ny;
 };
 
 static void check(int st)
@@ -74,13 +79,18 @@ static void check_options(const struct request *r, const struct opt *own, const 
         die(EXIT_USAGE, "how large are the pixels? Give -x ARCSEC");
     if (!(hypot(r->shear[0], r->shear[1]) < 1))
         die(EXIT_USAGE, "--shear %g,%g: a reduced shear is below 1", r->shear[0], r->shear[1]);
-    const double needs[] = {r->diffusion, r->jitter, r->ipc, r->box[0]};
-    static const char *const name[] = {"diffusion", "jitter", "ipc", "pixel"};
-    for (int i = 0; i < 4; i++)
+    const double needs[] = {r->diffusion, r->jitter, r->ipc, r->box[0], r->edge[0] + r->edge[1]};
+    static const char *const name[] = {"diffusion", "jitter", "ipc", "pixel", "pixel-edge"};
+    for (int i = 0; i < 5; i++)
         if (needs[i] > 0 && !r->psf)
             die(EXIT_USAGE, "--%s needs a PSF: give -p FILE", name[i]);
-    if (r->box[0] > 0 && r->no_pixel)
+    if ((r->box[0] > 0 || r->edge[0] + r->edge[1] > 0) && r->no_pixel)
         die(EXIT_USAGE, "--pixel and --no-pixel: give one");
+    for (int i = 0; i < 2; i++)
+        if (r->edge[i] > (r->box[i] > 0 ? r->box[i] : r->pixel))
+            die(EXIT_USAGE, "--pixel-edge %g: edges are shorter than the pixel is wide at half height", r->edge[i]);
+    if (r->wcs && r->subpixel > 1)
+        die(EXIT_USAGE, "--wcs and --subpixel: a WCS tells its own pixels: give one");
     if (r->whole && !r->psf)
         die(EXIT_USAGE, "--method field convolves with a PSF: give -p FILE");
     if (opt_given(own, c, "size") && (r->size[0] != floor(r->size[0]) || r->size[1] != floor(r->size[1])))
@@ -118,8 +128,8 @@ static void read_psf(struct input *in, const struct request *r, const struct com
     if (r->diffusion > 0 && in->otf.chdiff > 0)
         die(EXIT_RUN, "%s: charge diffusion of %g\" is in the PSF already (CHDIFF): leave --diffusion out or make the PSF "
             "with psfgen --diffusion 0", r->psf, in->otf.chdiff);
-    if (in->otf.pixel > 0 && r->box[0] > 0)
-        die(EXIT_RUN, "%s: a pixel of %g\" is in the PSF already (PIXRESP): leave --pixel out", r->psf, in->otf.pixel);
+    if (in->otf.pixel > 0 && (r->box[0] > 0 || r->edge[0] + r->edge[1] > 0))
+        die(EXIT_RUN, "%s: a pixel of %g\" is in the PSF already (PIXRESP): leave --pixel and --pixel-edge out", r->psf, in->otf.pixel);
     if (in->otf.pixel > 0 && !r->no_pixel && fabs(in->otf.pixel / v->pixel - 1) > 1e-6)
         die(EXIT_RUN, "%s: a pixel of %g\" is in the PSF already (PIXRESP): it does not fit pixels of %g\"; make one "
             "with psfgen without --pixel", r->psf, in->otf.pixel, v->pixel);
@@ -128,6 +138,7 @@ static void read_psf(struct input *in, const struct request *r, const struct com
     v->ipc = r->ipc;
     v->pitch = r->pixel;
     memcpy(v->box, r->box, sizeof v->box);
+    memcpy(v->edge, r->edge, sizeof v->edge);
     v->no_pixel = r->no_pixel || in->otf.pixel > 0;
     if (v->diffusion == 0 && isfinite(in->psf.fwhm))
         in->fwhm = in->psf.fwhm;
@@ -135,11 +146,40 @@ static void read_psf(struct input *in, const struct request *r, const struct com
         in->fwhm = NAN;
 }
 
-/* Sides from --size, or from the list's keyword FIELD: enough for whole detector pixels at every dither. */
+/* The WCS of --wcs, which must have the pixels that -x says. */
+static void read_wcs(struct input *in, const struct request *r, const struct common *c)
+{
+    struct fits_in *f;
+    struct header h = {0};
+    struct err e;
+    if (!r->wcs)
+        return;
+    if (fits_in_open(&f, r->wcs, c->max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    int i = fits_in_selected(f);
+    if (i < 0)
+        die(EXIT_RUN, "%s: no image in it: give one whose WCS is wanted", r->wcs);
+    in->nx = fits_in_hdu(f, i)->nx;
+    in->ny = fits_in_hdu(f, i)->ny;
+    if (fits_in_header(f, i, &h, &e))
+        die(EXIT_RUN, "%s", e.text);
+    fits_in_close(f);
+    if (sky_open(&in->sky, &h, &e))
+        die(EXIT_RUN, "%s: %s", r->wcs, e.text);
+    if (!(fabs(sky_scale(in->sky) / r->pixel - 1) < 0.1))
+        die(EXIT_RUN, "%s: its WCS has pixels of %.6g\": give -x %.6g, not %g", r->wcs, sky_scale(in->sky), sky_scale(in->sky), r->pixel);
+    check(exposure_copy_wcs(&in->wcs, &h));
+    header_free(&h);
+}
+
+/* Sides from --size, or those of the image of --wcs, or from the list's keyword FIELD: enough for whole detector pixels at every dither. */
 static void set_size(const struct input *in, const struct request *r, const char *name, struct view *v)
 {
     double side[2] = {r->size[0], r->size[1]}, field;
-    if (!(side[0] > 0)) {
+    if (!(side[0] > 0) && r->wcs) {
+        side[0] = (double)in->nx;
+        side[1] = (double)in->ny;
+    } else if (!(side[0] > 0)) {
         if (table_key_number(&in->list, "FIELD", &field) || !(field > 0))
             die(EXIT_USAGE, "%s: no keyword FIELD: give --size NX,NY in output pixels", name);
         double n = fmax(1, rint(field / r->pixel));
@@ -190,9 +230,13 @@ static int describe(struct header *h, const struct input *in, const struct reque
         st = header_set_double(h, "IPC", r->ipc, "charge to each of four neighbour pixels");
     for (int i = 0; i < 2 && st == OK && r->box[0] > 0; i++)
         st = header_set_double(h, i ? "PIXSIZE2" : "PIXSIZE1", r->box[i], "side of the pixel's response, arcsec");
+    for (int i = 0; i < 2 && st == OK && r->edge[0] + r->edge[1] > 0; i++)
+        st = header_set_double(h, i ? "PIXEDGE2" : "PIXEDGE1", r->edge[i], "length over which it falls to 0, arcsec");
     if (st == OK)
         st = header_set_bool(h, "PIXRESP", !v->no_pixel || in->otf.pixel > 0, "the pixel is in");
-    if (st == OK)
+    for (size_t i = 0; i < in->wcs.n && st == OK; i++)
+        st = header_append(h, in->wcs.card[i]);
+    if (st == OK && !r->wcs)
         st = sky_set_tan(h, v->pixel, 0.5 * ((double)v->nx + 1), 0.5 * ((double)v->ny + 1), r->centre[0], r->centre[1]);
     return st;
 }
@@ -224,6 +268,23 @@ static void positions(const struct input *in, const struct view *v, const struct
     sky_close(sky);
 }
 
+/* Pixel positions through the WCS of --wcs, and the maps of shapes that go with them. */
+static void through_wcs(struct input *in, const struct request *r, const struct view *v, double *x, double *y, double (*map)[4])
+{
+    const struct scene *s = &in->scene;
+    double centre[2] = {r->centre[0], r->centre[1]};
+    const double mid[2] = {0.5 * ((double)v->nx - 1), 0.5 * ((double)v->ny - 1)};
+    if (isnan(centre[0]) && sky_from_pixel(in->sky, 1, &mid[0], &mid[1], &centre[0], &centre[1]))
+        die(EXIT_RUN, "%s: the middle of the image has no place on the sky: give --center", r->wcs);
+    for (size_t i = 0; i < s->n; i++) {
+        x[i] = s->object[i].x - (s->where == SCENE_PIXEL);
+        y[i] = s->object[i].y - (s->where == SCENE_PIXEL);
+    }
+    check(distort(in->sky, centre, s->where, v->pixel, s->n, x, y, map));
+    for (size_t i = 0; i < s->n && (v->g1 != 0 || v->g2 != 0); i++)
+        check(distort_before((double[]){v->g1, v->g2}, map[i]));
+}
+
 /* ---- plan ---- */
 
 static void print_plan(FILE *f, const struct plan *p, const struct request *r)
@@ -232,8 +293,9 @@ static void print_plan(FILE *f, const struct plan *p, const struct request *r)
                                                  "mapped pixels (Gauss-Legendre)", "Fourier stamps"};
     const struct view *v = &p->view;
     fprintf(f, "simage: %ld x %ld pixels of %g\", %zu parts\n", v->nx, v->ny, v->pixel, p->n);
-    fprintf(f, "simage: effects:%s%s%s%s%s%s\n", v->psf ? " PSF" : "", r->diffusion > 0 ? " diffusion" : "",
-            r->jitter > 0 ? " jitter" : "", r->ipc > 0 ? " IPC" : "", v->no_pixel ? "" : " pixel", r->shear[0] != 0 || r->shear[1] != 0 ? " shear" : "");
+    fprintf(f, "simage: effects:%s%s%s%s%s%s%s\n", v->psf ? " PSF" : "", r->diffusion > 0 ? " diffusion" : "",
+            r->jitter > 0 ? " jitter" : "", r->ipc > 0 ? " IPC" : "", v->no_pixel ? "" : " pixel", r->shear[0] != 0 || r->shear[1] != 0 ? " shear" : "",
+            r->wcs ? " distortion" : "");
     for (int i = 0; i < PATH_COUNT; i++)
         if (p->count[i])
             fprintf(f, "simage: %zu %s\n", p->count[i], path[i]);
@@ -317,14 +379,24 @@ static void make_image(struct image *im, const struct view *v)
     im->hdr = h;
 }
 
+/* Files that no output may replace. */
+static void all_inputs(const struct request *r, const struct common *c, const char *inputs[4])
+{
+    inputs[0] = c->argv[0];
+    inputs[1] = r->models ? r->models : c->argv[0];
+    inputs[2] = r->psf ? r->psf : c->argv[0];
+    inputs[3] = r->wcs ? r->wcs : c->argv[0];
+}
+
 /* What is in the image, beside it. */
 static void write_truth(struct input *in, const struct request *r, const struct common *c, const struct header *h,
                         const double *x, const double *y, const char *record)
 {
-    const char *inputs[] = {c->argv[0], r->models ? r->models : c->argv[0], r->psf ? r->psf : c->argv[0]};
+    const char *inputs[4];
     struct err e;
+    all_inputs(r, c, inputs);
     check(truth_add(&in->list, &in->scene, h, x, y, r->exptime));
-    if (table_write(&in->list, r->truth, record, inputs, 3, &e))
+    if (table_write(&in->list, r->truth, record, inputs, 4, &e))
         die(EXIT_RUN, "%s", e.text);
 }
 
@@ -339,14 +411,19 @@ static void run(const struct request *r, const struct common *c, const char *rec
     struct err e;
     read_scene(&in, r, c);
     read_psf(&in, r, c, &v);
+    read_wcs(&in, r, c);
     set_size(&in, r, c->argv[0], &v);
     check(describe(&im.hdr, &in, r, &v));
 
     double *x = malloc((2 * in.scene.n + 1) * sizeof *x);
-    if (!x)
+    double (*map)[4] = r->wcs ? malloc((in.scene.n + 1) * sizeof *map) : NULL;
+    if (!x || (r->wcs && !map))
         check(E_NOMEM);
-    positions(&in, &v, &im.hdr, x, x + in.scene.n);
-    int st = emission_new(&emission, &in.scene, &in.models, x, x + in.scene.n, r->exptime);
+    if (map)
+        through_wcs(&in, r, &v, x, x + in.scene.n, map);
+    else
+        positions(&in, &v, &im.hdr, x, x + in.scene.n);
+    int st = emission_new(&emission, &in.scene, &in.models, x, x + in.scene.n, map, r->exptime);
     if (st == E_RANGE)
         die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
     check(st);
@@ -357,6 +434,9 @@ static void run(const struct request *r, const struct common *c, const char *rec
     scene_free(&in.scene);
     table_free(&in.list);
     free(x);
+    free(map);
+    sky_close(in.sky);
+    header_free(&in.wcs);
     if (r->whole) {
         if (!c->check)
             make_image(&im, &v);
@@ -368,8 +448,9 @@ static void run(const struct request *r, const struct common *c, const char *rec
         draw(&plan, &im, c);
     }
     if (!c->check) {
-        const char *inputs[] = {c->argv[0], r->models ? r->models : c->argv[0], r->psf ? r->psf : c->argv[0]};
-        if (image_write(&im, c->out, record, inputs, 3, &e))
+        const char *inputs[4];
+        all_inputs(r, c, inputs);
+        if (image_write(&im, c->out, record, inputs, 4, &e))
             die(EXIT_RUN, "%s", e.text);
     }
     plan_free(&plan);
@@ -406,6 +487,8 @@ int main(int argc, char **argv)
         {"jitter", 0, OPT_REAL, &r.jitter, 0, 1e3, "ARCSEC", "motion of the line of sight, rms per axis", 0, 0},
         {"ipc", 0, OPT_REAL, &r.ipc, 0, 0.2, "A", "charge shared with each of four neighbours", 0, 0},
         {"pixel", 0, OPT_PAIR, r.box, 1e-9, 1e6, "W,H", "sides of the pixel's response, arcsec", 0, 0},
+        {"pixel-edge", 0, OPT_PAIR, r.edge, 0, 1e6, "EX,EY", "lengths over which it falls to 0, arcsec", 0, 0},
+        {"wcs", 0, OPT_STR, &r.wcs, 0, 0, "FILE", "see the sky through this image's WCS, distortion included", 0, 1},
         {"center", 0, OPT_PAIR, r.centre, -360, 360, "RA,DEC", "sky position of the field centre, deg", 0, 0},
         {"set", 0, OPT_STR, &r.set, 0, 0, "NAME", "name of the set, keyword SETNAME", 0, 0},
         {"truth", 0, OPT_STR, &r.truth, 0, 0, "FILE", "write the list with position and flux in the image", 0, 1},
@@ -417,6 +500,8 @@ int main(int argc, char **argv)
     };
     opt_parse(&prog, own, &c, argc, argv);
     check_options(&r, own, &c);
+    if (r.wcs && !opt_given(own, &c, "center"))
+        r.centre[0] = r.centre[1] = NAN;
     char *record = opt_record(&prog, own, &c);
     run(&r, &c, record);
     free(record);

@@ -1,5 +1,6 @@
 /* emit.c - a scene list turned into what the renderer draws. */
 #include "emit.h"
+#include "shear.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -97,9 +98,28 @@ static int round_shear(const struct object *o, double g[2])
     return shear_then(shape, own, g, &turn);
 }
 
+/* A map after the own shear becomes part of dilation, rotation, parity and own shear. */
+static void bend(struct emitter *to, const double map[4])
+{
+    double s[4], a[4];
+    struct map_parts p;
+    int st = shear_matrix(to->g1, to->g2, s);
+    for (int i = 0; i < 4 && st == OK; i++)
+        a[i] = map[i / 2 * 2] * s[i % 2] + map[i / 2 * 2 + 1] * s[2 + i % 2];
+    if (st || map_split(a, &p)) {
+        to->g1 = to->g2 = NAN;             /* cannot be drawn: the plan counts it */
+        return;
+    }
+    to->dilation *= p.scale;
+    to->rotation = p.turn + (p.mirror ? -to->rotation : to->rotation);
+    to->parity = p.mirror ? -to->parity : to->parity;
+    to->g1 = p.g[0];
+    to->g2 = p.g[1];
+}
+
 /* n Gaussians of width sigma (units of RE) for a round object. */
 static int emit_round(struct emission *e, const struct object *o, struct emitter base, int n, const double *sigma,
-                      const double *flux, double *coef)
+                      const double *flux, const double *map, double *coef)
 {
     double g[2];
     int st = round_shear(o, g);
@@ -110,6 +130,8 @@ static int emit_round(struct emission *e, const struct object *o, struct emitter
         to->flux = base.flux * flux[k];
         to->g1 = st ? NAN : g[0];
         to->g2 = st ? NAN : g[1];
+        if (map)
+            bend(to, map);
         to->rotation = 0;
         to->parity = 1;
         to->parts = k ? 0 : n;
@@ -149,7 +171,7 @@ static int count_parts(const struct scene *s, size_t *total)
 }
 
 int emission_new(struct emission *e, const struct scene *s, const struct models *m, const double *x,
-                 const double *y, double exptime)
+                 const double *y, double (*map)[4], double exptime)
 {
     size_t total = 0, used = 0;
     int st = count_parts(s, &total);
@@ -174,11 +196,13 @@ int emission_new(struct emission *e, const struct scene *s, const struct models 
             base.beta = m->beta[o->model];
             base.nmax = m->nmax[o->model];
             base.coef = m->coef + m->offset[o->model];
+            if (map)
+                bend(&base, map[i]);
         } else {
             if (o->type == OBJECT_GAUSS || o->n != last)
                 parts = round_parts(o, sigma, flux);
             last = o->type == OBJECT_GAUSS ? NAN : o->n;
-            used += (size_t)emit_round(&made, o, base, parts, sigma, flux, made.coef + used);
+            used += (size_t)emit_round(&made, o, base, parts, sigma, flux, map ? map[i] : NULL, made.coef + used);
             continue;
         }
         made.emitter[made.n++] = base;

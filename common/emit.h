@@ -24,10 +24,11 @@ struct emission {
 
 /*
  * x[i], y[i]: pixel positions (centre of the first is 0) of the objects of s.  exptime in s.
- * Coefficients of shapelets stay in m.  E_RANGE: a Sersic index outside 0.5..8; E_NOMEM.
+ * map, or NULL: a matrix for each object that acts on its shape after its own shear (distort.h); stars are
+ * points and stay points.  Coefficients of shapelets stay in m.  E_RANGE: a Sersic index outside 0.5..8; E_NOMEM.
  */
 MUST_CHECK int emission_new(struct emission *e, const struct scene *s, const struct models *m, const double *x,
-                            const double *y, double exptime);
+                            const double *y, double (*map)[4], double exptime);
 void emission_free(struct emission *e);
 
 /*

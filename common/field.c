@@ -63,6 +63,8 @@ static int blurred(const struct field *f, const struct view *v, const struct acc
     w.no_pixel = 1;
     w.psf = &one;
     w.diffusion = f->sigma;
+    w.ipc = 0;
+    w.edge[0] = w.edge[1] = 0;
     own.eps = fmax(0.1 * a->eps, 1e-11);
     own.floor = 0.1 * a->floor / ((double)f->split * f->split);
     st = scene_plan(&p, &w, &own, n, moved);
@@ -95,15 +97,12 @@ static void fold(const struct field *f, int kx, int ky, double re, double im, do
     }
 }
 
-/* Factors of one axis: the pixel and the diffusion of the view over the Gaussian. */
-static void factors(const struct field *f, const struct view *v, int n, const double *u, double *x)
+/* Factors of one axis: what the detector does, over the Gaussian. */
+static void factors(const struct field *f, const struct stamp_response *r, int axis, int n, const double *u, double *x)
 {
     for (int i = 0; i < n; i++)
         x[i] = exp(2 * M_PI * M_PI * f->sigma * f->sigma * u[i] * u[i]);
-    if (v->diffusion > 0)
-        otf_diffusion(n, u, v->diffusion, x);
-    if (!v->no_pixel)
-        otf_box(n, u, v->pixel, x);
+    stamp_factors(r, axis, n, u, x);
 }
 
 /* Spectrum of the fine grid times T over Gaussian, folded into out. */
@@ -113,16 +112,21 @@ static int transfer(const struct field *f, const struct view *v, const double *s
     const double lx = f->nx * v->pixel, ly = f->ny * v->pixel;
     const int kx = (int)floor(v->psf->ucut * lx), ky = (int)floor(v->psf->ucut * ly), rows = 2 * ky + 1;
     const size_t cols = (size_t)kx + 1;
-    double *u = malloc((2 * (cols + (size_t)rows) + 2 * BLOCK * cols) * sizeof *u);
+    const struct stamp_response response = view_response(v);
+    double *u = malloc((3 * (cols + (size_t)rows) + 2 * BLOCK * cols) * sizeof *u);
     if (!u)
         return E_NOMEM;
-    double *uy = u + cols, *gx = uy + rows, *gy = gx + cols, *re = gy + rows, *im = re + BLOCK * cols;
+    double *uy = u + cols, *gx = uy + rows, *gy = gx + cols, *cx = gy + rows, *cy = cx + cols, *re = cy + rows, *im = re + BLOCK * cols;
     for (int i = 0; i <= kx; i++)
         u[i] = i / lx;
     for (int j = 0; j < rows; j++)
         uy[j] = (j - ky) / ly;
-    factors(f, v, kx + 1, u, gx);
-    factors(f, v, rows, uy, gy);
+    factors(f, &response, 0, kx + 1, u, gx);
+    factors(f, &response, 1, rows, uy, gy);
+    if (response.ipc > 0) {
+        otf_neighbours(kx + 1, u, response.pitch, cx);
+        otf_neighbours(rows, uy, response.pitch, cy);
+    }
     int st = OK;
     for (int j = 0; j < rows && st == OK; j += BLOCK) {
         const int m = rows - j < BLOCK ? rows - j : BLOCK;
@@ -132,7 +136,8 @@ static int transfer(const struct field *f, const struct view *v, const double *s
             const double *s = spectrum + 2 * (size_t)((k + fy) % fy) * ((size_t)fx / 2 + 1);
             for (int i = 0; i <= kx; i++) {
                 const size_t t = (size_t)r * cols + (size_t)i;
-                const double g = gx[i] * gy[j + r], a = g * re[t], b = otf_is_real(v->psf) ? 0 : g * im[t];
+                const double share = response.ipc > 0 ? 1 + response.ipc * (cx[i] + cy[j + r] - 4) : 1;
+                const double g = gx[i] * gy[j + r] * share, a = g * re[t], b = otf_is_real(v->psf) ? 0 : g * im[t];
                 fold(f, i, k, a * s[2 * i] - b * s[2 * i + 1], a * s[2 * i + 1] + b * s[2 * i], out);
             }
         }

@@ -30,15 +30,29 @@ int shear_then(const double first[2], const double then[2], double g[2], double 
     double p[4], q[4];
     if (shear_matrix(first[0], first[1], p) || shear_matrix(then[0], then[1], q))
         return E_RANGE;
-    const double a11 = q[0] * p[0] + q[1] * p[2], a12 = q[0] * p[1] + q[1] * p[3];
-    const double a21 = q[2] * p[0] + q[3] * p[2], a22 = q[2] * p[1] + q[3] * p[3];
+    const double a[4] = {q[0] * p[0] + q[1] * p[2], q[0] * p[1] + q[1] * p[3], q[2] * p[0] + q[3] * p[2], q[2] * p[1] + q[3] * p[3]};
+    struct map_parts m;
+    int st = map_split(a, &m);
+    if (st)
+        return st;
+    *turn = m.turn;
+    g[0] = m.g[0];
+    g[1] = m.g[1];
+    return OK;
+}
+
+int map_split(const double a[4], struct map_parts *m)
+{
+    const double det = a[0] * a[3] - a[1] * a[2], way = det < 0 ? -1 : 1;
+    const double a11 = a[0], a12 = way * a[1], a21 = a[2], a22 = way * a[3];
     /* polar decomposition: A = S R, S symmetric */
     const double t = atan2(a21 - a12, a11 + a22), c = cos(t), d = sin(t);
     const double s11 = a11 * c - a12 * d, s12 = a11 * d + a12 * c, s22 = a21 * d + a22 * c;
-    *turn = t;
-    g[0] = (s11 - s22) / (s11 + s22);
-    g[1] = 2 * s12 / (s11 + s22);
-    return hypot(g[0], g[1]) < 1 ? OK : E_RANGE;
+    const struct map_parts made = {sqrt(fabs(det)), t, {(s11 - s22) / (s11 + s22), 2 * s12 / (s11 + s22)}, det < 0};
+    if (!(made.scale > 0) || !isfinite(made.scale) || !(hypot(made.g[0], made.g[1]) < 1))
+        return E_RANGE;
+    *m = made;
+    return OK;
 }
 
 /* Own shear, then the field's; with a series, the own shear alone. */
@@ -404,10 +418,9 @@ static int finish_orders(struct maker *m)
     return shapelet_rotation_table(turned, p->rotation);
 }
 
-/* What the detector does to the light, of the view. */
-static struct stamp_response response_of(const struct view *v)
+struct stamp_response view_response(const struct view *v)
 {
-    struct stamp_response r = {.diffusion = v->diffusion, .ipc = v->ipc, .pitch = v->pitch};
+    struct stamp_response r = {.diffusion = v->diffusion, .ipc = v->ipc, .pitch = v->pitch, .edge = {v->edge[0], v->edge[1]}};
     if (!v->no_pixel) {
         r.box = v->box[0] > 0 ? v->box[0] : v->pixel;
         r.box_y = v->box[1];
@@ -419,7 +432,7 @@ static struct stamp_response response_of(const struct view *v)
 static int finish_grids(struct maker *m)
 {
     struct plan *p = m->p;
-    const struct stamp_response r = response_of(&p->view);
+    const struct stamp_response r = view_response(&p->view);
     p->grid = calloc(SIDES, sizeof *p->grid);
     if (!p->grid)
         return E_NOMEM;
@@ -453,7 +466,7 @@ static int make(struct maker *m)
     }
     int st = envelope_new(&m->env, nmax);
     if (st == OK && p->view.psf) {
-        const struct stamp_response r = response_of(&p->view);
+        const struct stamp_response r = view_response(&p->view);
         st = wings_new(&p->wings, p->view.psf, &r, p->view.pixel);
         p->fft_plans++;
     }

@@ -32,6 +32,16 @@ struct emitter {
 /* Shear `first`, then `then` = rotation by *turn (rad), then shear g. E_RANGE for |g| >= 1. */
 MUST_CHECK int shear_then(const double first[2], const double then[2], double g[2], double *turn);
 
+/*
+ * Any matrix a (rows) = scale times shear g times rotation by turn (rad), and before all that y -> -y when
+ * mirror is 1. E_RANGE: singular or not finite.
+ */
+struct map_parts {
+    double scale, turn, g[2];
+    int mirror;
+};
+MUST_CHECK int map_split(const double a[4], struct map_parts *m);
+
 /* The image to be made. */
 struct view {
     long nx, ny;
@@ -39,6 +49,7 @@ struct view {
     int no_pixel;          /* values at pixel centres times pixel^2 instead of integrals */
     double diffusion;      /* sigma of charge diffusion beyond what psf holds, arcsec; needs psf */
     double box[2];         /* sides of the pixel's response, arcsec; 0: the pixel; needs psf */
+    double edge[2];        /* lengths over which it falls to 0, arcsec; needs psf */
     double ipc;            /* charge to each of four neighbours, pitch arcsec away; needs psf */
     double pitch;
     const struct otf *psf; /* NULL: none */
@@ -95,6 +106,9 @@ struct plan {
     double bytes;                     /* memory of tables and draws */
     size_t fft_plans;                 /* FFT plans made: 0 without a PSF */
 };
+
+/* What the detector does to the light, of the view. */
+struct stamp_response view_response(const struct view *v);
 
 /* Decide for n objects (kept by reference). E_RANGE, E_NOMEM. */
 MUST_CHECK int scene_plan(struct plan *p, const struct view *v, const struct accuracy *a, size_t n,

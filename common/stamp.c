@@ -115,23 +115,29 @@ static void apply_factors(struct stamp_grid *g, const double *x, const double *y
     }
 }
 
+void stamp_factors(const struct stamp_response *r, int axis, int n, const double *u, double *f)
+{
+    const double box = axis && r->box_y > 0 ? r->box_y : r->box;
+    if (r->diffusion > 0)
+        otf_diffusion(n, u, r->diffusion, f);
+    if (box > 0)
+        otf_box(n, u, box, f);
+    if (r->edge[axis] > 0)
+        otf_box(n, u, r->edge[axis], f);
+}
+
 /* The factors beyond the PSF; u: 0..kmax du, f: 3 (kmax + 1) of scratch. */
 static void factors(struct stamp_grid *g, const struct stamp_response *r, const double *u, double *f)
 {
-    const int n = g->kmax + 1, tall = r->box_y > 0;
+    const int n = g->kmax + 1, tall = r->box_y > 0 || r->edge[0] != r->edge[1];
     double *x = f, *y = tall ? f + n : f, *c = f + 2 * n;
-    if (!(r->diffusion > 0) && !(r->box > 0) && !tall && !(r->ipc > 0))
+    if (!(r->diffusion > 0) && !(r->box > 0) && !(r->edge[0] > 0) && !tall && !(r->ipc > 0))
         return;
     for (int i = 0; i < n; i++)
         x[i] = y[i] = 1;
-    if (r->diffusion > 0)
-        otf_diffusion(n, u, r->diffusion, x);
+    stamp_factors(r, 0, n, u, x);
     if (tall)
-        memcpy(y, x, (size_t)n * sizeof *y);
-    if (r->box > 0)
-        otf_box(n, u, r->box, x);
-    if (tall)
-        otf_box(n, u, r->box_y, y);
+        stamp_factors(r, 1, n, u, y);
     if (r->ipc > 0)
         otf_neighbours(n, u, r->pitch, c);
     apply_factors(g, x, y, r->ipc, c);
@@ -162,7 +168,7 @@ int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp
                    int n)
 {
     if (n < 4 || n > 4096 || n % 2 || !(pixel > 0) || !(t->ucut > 0) || !(t->ucut * pixel < 64) ||
-        !(r->diffusion >= 0) || !(r->box >= 0) || !(r->box_y >= 0) || !(r->ipc >= 0) || !(r->pitch >= 0))
+        !(r->diffusion >= 0) || !(r->box >= 0) || !(r->box_y >= 0) || !(r->edge[0] >= 0) || !(r->edge[1] >= 0) || !(r->ipc >= 0) || !(r->pitch >= 0))
         return E_RANGE;
     struct stamp_grid s = {.n = n, .pixel = pixel, .du = 1 / (n * pixel)};
     s.kmax = last_frequency(t->ucut, pixel, n);

@@ -55,9 +55,16 @@ struct stamp_response {
     double diffusion;      /* sigma of a Gaussian */
     double box;            /* side of the pixel along x, and along y when box_y is 0 */
     double box_y;          /* side along y */
+    double edge[2];        /* along x and y: the response falls to 0 over this length, a trapezoid `box` wide at half height */
     double ipc;            /* charge that each of the four neighbours, pitch away, gets: 1 - 4 ipc stays */
     double pitch;
 };
+
+/*
+ * Multiply f[0..n-1] by what acts along one axis (0: x, 1: y) at frequencies u: diffusion, pixel and its edges;
+ * the rest is 1 + ipc (c_x + c_y - 4), c of otf_neighbours.
+ */
+void stamp_factors(const struct stamp_response *r, int axis, int n, const double *u, double *f);
 
 /* Tabulate; n even, 4..4096. E_RANGE, E_NOMEM. */
 MUST_CHECK int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r,

@@ -20,12 +20,12 @@ data() { perl -0777 -pe 's/(HISTORY |CHECKSUM).{72}//gs; s/END {77,}/END/' "$1" 
 # no byte
 simage o.txt -p psf.fits $S -o a.fits; data a.fits
 simage o.txt $S -o b.fits; data b.fits
-for o in "--diffusion 0" "--jitter 0" "--ipc 0" "--shear 0,0" "--shear 0,0 --shear-order 4" "--shear -0,-0" "--subpixel 1"; do
+for o in "--diffusion 0" "--jitter 0" "--ipc 0" "--pixel-edge 0,0" "--shear 0,0" "--shear 0,0 --shear-order 4" "--shear -0,-0" "--subpixel 1"; do
    
     simage o.txt -p psf.fits $S $o -o c.fits; data c.fits
     sed -i 's/SHEARORD=                    4/SHEARORD=                    0/; s/ -0\.0 /  0.0 /g' c.fits.data
     cmp -s a.fits.data c.fits.data && pass "simage $o: no byte" || fail "simage $o: bytes differ from none"
-    case $o in *diff* | *jit* | *ipc*) continue ;; esac
+    case $o in *diff* | *jit* | *ipc* | *edge*) continue ;; esac
    
     simage o.txt $S $o -o c.fits; data c.fits
     sed -i 's/SHEARORD=                    4/SHEARORD=                    0/; s/ -0\.0 /  0.0 /g' c.fits.data
@@ -70,6 +70,25 @@ $F dump wide.fits 0 >wide.txt; $F dump narrow.fits 0 >narrow.txt
 # centres of 48 pixels lie on edges of 49: two neighbours, halved, are the wide response
 near "a response of two pixels = the mean of two, of the peak" "$(awk 'NR == FNR { v[$1, $2] = $3; next }
     { e = $3 - (v[$1, $2] + v[$1 + 1, $2]) / 2; if (e < 0) e = -e; if (e > m) m = e; if ($3 > p) p = $3 } END { print m / p }' narrow.txt wide.txt)" 0 4e-6
+# edges: a trapezoid is the box averaged over places within EX and EY (Gauss-Legendre, 4 x 4 of them)
+awk 'function node(i) { return i == 1 ? -.861136311594053 : i == 2 ? -.339981043584856 : i == 3 ? .339981043584856 : .861136311594053 }
+    function weight(i) { return i == 1 || i == 4 ? .173927422568727 : .326072577431273 }
+    /^#/ { print; next } { for (i = 1; i <= 4; i++) for (j = 1; j <= 4; j++) printf "%.15g %.15g %.15g %s %s\n", $1 + .015 * node(i), $2 + .02 * node(j), $3 * weight(i) * weight(j), $4, $5 }' o.txt >spread.txt
+simage o.txt -p psf.fits $S --accuracy 1e-6 --pixel 0.1,0.08 --pixel-edge 0.03,0.04 -o edge.fits
+simage spread.txt -p psf.fits $S --accuracy 1e-7 --pixel 0.1,0.08 -o spread.fits
+near "a trapezoid response = the box spread over its edges, of the peak" "$(pix diff edge.fits spread.fits | cut -d' ' -f1)" 0 1e-6
+simage o.txt -p psf.fits $S --accuracy 1e-6 --pixel 0.1,0.08 -o box.fits
+between "and not the box, of the peak" "$(pix diff edge.fits box.fits | cut -d' ' -f1)" 1e-3 1
+near "PIXEDGE2" "$(card edge.fits PIXEDGE2)" 0.04 1e-15
+# the convolution of the whole field knows the same effects
+for o in "--jitter 0.03" "--ipc 0.01" "--pixel 0.12,0.08" "--pixel-edge 0.04,0.06" "--diffusion 0.04 --jitter 0.02 --ipc 0.02 --pixel 0.1,0.08 --pixel-edge 0.02,0"; do
+    simage o.txt -p psf.fits $S --accuracy 1e-6 $o -o stamps.fits
+    simage o.txt -p psf.fits $S --accuracy 1e-6 $o --method field -o whole.fits
+    near "$o: stamps and field, of the peak" "$(pix diff stamps.fits whole.fits | cut -d' ' -f1)" 0 2e-6
+done
+fails "edges longer than the pixel" 2 simage o.txt -p psf.fits $S --pixel-edge 0.11,0 -o no.fits
+fails "edges without a PSF" 2 simage o.txt $S --pixel-edge 0.01,0 -o no.fits
+fails "edges and --no-pixel" 2 simage o.txt -p psf.fits $S --no-pixel --pixel-edge 0.01,0 -o no.fits
 
 # no function
 if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then
@@ -97,7 +116,7 @@ own() {
     else fail "$n:$wrong"; fi
 }
 K="stamp_fourier stamp_grid_new wings_new psf_read otf_diffusion otf_neighbours otf_box stamp_closed shapelet_pixel shear_matrix_coeff shear_apply shear_series \
-shapelet_rotate_by shapelet_mirror shear_exact sersic_gaussians sky_to_pixel models_open"
+shapelet_rotate_by shapelet_mirror shear_exact sersic_gaussians sky_to_pixel distort models_open"
 I="-x 0.1 --size 12,12 --accuracy 1e-1 -o x.fits"
 P="-p psf.fits"
 F1="stamp_fourier stamp_grid_new wings_new psf_read"
@@ -112,21 +131,28 @@ entered rotation simage turned.txt --models m.txt $I --no-pixel;  own rotation "
 entered parity simage mirror.txt --models m.txt $I --no-pixel;    own parity "stamp_closed models_open shapelet_mirror" "$K"
 entered sersic simage sersic.txt $I --no-pixel;            own sersic "stamp_closed sersic_gaussians" "$K"
 entered sky-position simage sky.txt $I --no-pixel;         own sky-position "stamp_closed sky_to_pixel" "$K"
+entered distortion simage o.txt $I --no-pixel --wcs b.fits; own distortion "stamp_closed distort sky_to_pixel shear_exact" "$K"
 entered psf simage o.txt $I $P --no-pixel;                 own psf "$F1" "$K"
 entered psf-pixel simage o.txt $I $P;                      own psf-pixel "$F1 otf_box" "$K"
 entered psf-diffusion simage o.txt $I $P --no-pixel --diffusion 0.04; own psf-diffusion "$F1 otf_diffusion" "$K"
 entered psf-jitter simage o.txt $I $P --no-pixel --jitter 0.01; own psf-jitter "$F1 otf_diffusion" "$K"
 entered psf-ipc simage o.txt $I $P --no-pixel --ipc 0.01;  own psf-ipc "$F1 otf_neighbours" "$K"
 }
+entered psf-edge simage o.txt $I $P --pixel-edge 0.02,0.02;  own psf-edge "$F1 otf_box" "$K"
 # calls NAME FUNCTION: how often it was called
 calls() { awk -v f="$2" '/^c?fn=/ { id = $1; sub(/^c?fn=/, "", id); if (NF > 1) name[id] = $2 }
     /^cfn=/ { to = id } /^calls=/ { split($1, c, "="); if (name[to] ~ "^" f "([.\x27]|$)") n += c[2] } END { print n + 0 }' "$1.cg"; }
+near "edges: one more factor for each table" "$(awk -v a="$(calls psf-edge otf_box)" -v b="$(calls psf-pixel otf_box)" 'BEGIN { print a / b }')" 2 0
 N="poisson_inverse_run noise_depth_sky noise_psf_area"
 simage o.txt -x 0.1 --size 12,12 -T 1 -o s.fits
 entered photons addnoise s.fits -o x.fits;                         own photons "poisson_inverse_run" "$N"
 entered sky addnoise s.fits --sky 25 --dark 0.1 -o x.fits;           own sky "poisson_inverse_run" "$N"
 entered depth addnoise s.fits --depth 27 -o x.fits;                own depth "poisson_inverse_run noise_depth_sky" "$N"
 entered read-noise addnoise s.fits --read-noise 4 -o x.fits;       own read-noise "poisson_inverse_run" "$N"
+simage o.txt -x 0.1 --size 300,300 -T 1 -o large.fits
+entered large addnoise large.fits -o x.fits
+entered large-off addnoise large.fits --gain 1 --qe 1 --dark 0 --sky-rate 0 --read-noise 0 -o x.fits
+near "gain, efficiency, dark, sky and read noise of nothing: instructions over those without" "$(awk -v a="$(cat large-off.ir)" -v b="$(cat large.ir)" 'BEGIN { print a / b }')" 1 0.002
 near "photons: one number a pixel" "$(calls photons rng_uniform_run)" 1 0
 near "read noise: two" "$(calls read-noise rng_uniform_run)" 2 0
 Z="zernike otf_diffusion otf_box fft_run pupil_annulus"
@@ -136,5 +162,7 @@ entered discs psfgen $G --diffusion 0 --struts 0;                  own discs "pu
 entered struts psfgen $G --diffusion 0;                            own struts "fft_run" "$Z"
 entered aberration psfgen $G --diffusion 0 --zernike 4:0.05;       own aberration "zernike fft_run" "$Z"
 entered psfgen-diffusion psfgen $G --diffusion 0.04 --struts 0;    own psfgen-diffusion "otf_diffusion pupil_annulus" "$Z"
+entered band psfgen $G --diffusion 0 --struts 0 --bandwidth 80;   own band "pupil_annulus" "$Z"
+near "a band: as many closed forms as wavelengths" "$(awk -v a="$(calls band pupil_annulus)" -v b="$(calls discs pupil_annulus)" 'BEGIN { print a / b }')" 8 0
 entered psfgen-pixel psfgen $G --diffusion 0 --pixel 0.1 --struts 0; own psfgen-pixel "otf_box pupil_annulus" "$Z"
 }

@@ -17,7 +17,7 @@
 #include "tableio.h"
 #include <string.h>
 
-enum { GENERATED = 240, STARS = 30, GAUSS = 30, SERSIC = 10, ROOM = 4096 };
+enum { GENERATED = 240, STARS = 30, GAUSS = 30, SERSIC = 10, ROOM = 2560 };
 
 /* ---- objects ---- */
 
@@ -274,7 +274,7 @@ static void requested(const struct request *q, const struct otf *t, const struct
         x[all->n + s.n] = 3000 + uniform((int)i, 13);
         s.object[s.n++] = all->object[i];
     }
-    if (emission_new(&e, &s, m, x, x + all->n, 2000) || scene_plan(&p, &v, &a, e.n, e.emitter) || stamp_work_new(&r.work))
+    if (emission_new(&e, &s, m, x, x + all->n, NULL, 2000) || scene_plan(&p, &v, &a, e.n, e.emitter) || stamp_work_new(&r.work))
         exit(1);
     r.scratch = malloc((3 * plan_scratch(&p) + 1) * sizeof *r.scratch);
     r.sum = fft_alloc((size_t)ROOM * ROOM * sizeof *r.sum);
