@@ -89,6 +89,9 @@ sanitize:    # the tests again under AddressSanitizer and UndefinedBehaviorSanit
 tsan:    # the tests again under ThreadSanitizer
 	$(MAKE) check BUILD=build/tsan BIN=build/tsan/bin CFLAGS='-O2 -g' SAN='-fsanitize=thread'
 
+fuzz:    # RUNS (100000) random inputs for each reader, guided by coverage; needs clang
+	tests/fuzz/run $(RUNS)
+
 coverage:    # lines that the tests reach, one figure a file
 	$(MAKE) check BUILD=build/coverage BIN=build/coverage/bin CFLAGS='-O0 -g --coverage' LDFLAGS=--coverage
 	@tests/coverage build/coverage
@@ -140,4 +143,4 @@ clean:    # remove everything that was built
 help:    # this list
 	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all layers check check-large sanitize tsan coverage lint bench accuracy quick paper calibration deps deps-slurm install uninstall clean help FORCE
+.PHONY: all layers check check-large sanitize tsan fuzz coverage lint bench accuracy quick paper calibration deps deps-slurm install uninstall clean help FORCE

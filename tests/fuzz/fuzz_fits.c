@@ -1,24 +1,11 @@
 /*
- * fuzz_fits.c - the FITS readers on any bytes.
- *
- *   clang -fsanitize=fuzzer,address,undefined: libFuzzer's main calls the function below
- *   otherwise: fuzz_fits FILE...   runs each file once, prints how it ended
- *
- * Build by hand, for example
- *   clang -std=c11 -D_GNU_SOURCE -g -O1 -fsanitize=fuzzer,address,undefined -Icommon $(pkg-config --cflags wcslib)
- *       tests/fuzz/fuzz_fits.c $(ls common/[^q]*.c) $(pkg-config --libs wcslib fftw3 gsl zlib) -lm -o fuzz_fits
- * and -DFUZZER, and start it with a folder of the files that tests/cmd/badfits.sh makes.
+ * fuzz_fits.c - the FITS readers on any bytes: images, world coordinates, tables.
  */
+#include "fuzz.h"
 #include "imageio.h"
 #include "sky.h"
 #include "table.h"
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void read_images(struct fits_in *f)
 {
@@ -47,16 +34,11 @@ static void read_images(struct fits_in *f)
 }
 
 /* A file of these bytes is read as images and as a table; nothing may crash, leak or grow. */
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+void fuzz_file(const char *name)
 {
-    char name[64];
     struct err e = {""};
     struct fits_in *f;
     struct table t;
-    int fd = memfd_create("fuzz", 0);
-    if (fd < 0 || write(fd, data, size) != (ssize_t)size)
-        abort();
-    snprintf(name, sizeof name, "/proc/self/fd/%d", fd);
     if (fits_in_open(&f, name, 64e6, &e) == OK) {
         read_images(f);
         if (fits_in_table(f, &t, &e) == OK)
@@ -65,23 +47,4 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     } else if (!e.text[0]) {
         abort();           /* a failure without a cause */
     }
-    close(fd);
-    return 0;
 }
-
-#ifndef FUZZER
-int main(int argc, char **argv)
-{
-    static uint8_t data[1 << 24];
-    for (int i = 1; i < argc; i++) {
-        FILE *f = fopen(argv[i], "rb");
-        if (!f)
-            die(EXIT_RUN, "%s: cannot read", argv[i]);
-        size_t n = fread(data, 1, sizeof data, f);
-        fclose(f);
-        LLVMFuzzerTestOneInput(data, n);
-        printf("%s: survived\n", argv[i]);
-    }
-    return EXIT_DONE;
-}
-#endif
