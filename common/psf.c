@@ -7,6 +7,7 @@
  *   inside(r)  = du^2 sum_q S_q r J1(2 pi r du sqrt q) / (du sqrt q).
  */
 #include "psf.h"
+#include "simd.h"
 #include "fft.h"
 #include <math.h>
 #include <stdlib.h>
@@ -317,7 +318,7 @@ int psf_moment_index(int a, int b)
 }
 
 /*
- * Transforms of x^a W(x), a = 0..4, at each u, times the factors, with the shift to x0: f[(a*n + i)*2] complex,
+ * Transforms of x^a W(x), a = 0..4, at each u, times the factors, with the shift to x0: f[2*a*n + i], imaginary parts n behind,
  * int x^a exp(-x^2/2w^2 + 2 pi i u (x + x0)) dx; 0 where the Gaussian is below 1e-40.
  */
 static void weight_terms(const struct nodes *grid, double w, double x0, double *f)
@@ -330,37 +331,66 @@ static void weight_terms(const struct nodes *grid, double w, double x0, double *
                        3 * w * w * w * w - 6 * w * w * s * s + s * s * s * s};
         double turn = remainder(u * x0, 1), c = g * cos(2 * M_PI * turn), d = g * sin(2 * M_PI * turn);
         for (int a = 0; a < 5; a++) {
-            double *at = f + 2 * ((size_t)a * (size_t)n + (size_t)i);
+            double *at = f + 2 * (size_t)a * (size_t)n + i;
             /* odd a carry a factor i */
             at[0] = h[a] * (a % 2 ? -d : c);
-            at[1] = h[a] * (a % 2 ? c : d);
+            at[n] = h[a] * (a % 2 ? c : d);
         }
     }
+}
+
+typedef double v8 __attribute__((vector_size(64), aligned(8), may_alias));
+
+/* out[0] = sum p[i] f[i], out[1] = sum p[i] f[n + i], i = from..to-1: eight sums each, added at the end. */
+WIDE static void two_sums(const double *p, const double *f, int n, int from, int to, double out[2])
+{
+    v8 a = {0}, b = {0};
+    int i = from;
+    for (; i + 8 <= to; i += 8) {
+        const v8 q = *(const v8 *)(p + i);
+        a += q * *(const v8 *)(f + i);
+        b += q * *(const v8 *)(f + n + i);
+    }
+    out[0] = out[1] = 0;
+    for (int k = 0; k < 8; k++) {
+        out[0] += a[k];
+        out[1] += b[k];
+    }
+    for (; i < to; i++) {
+        out[0] += p[i] * f[i];
+        out[1] += p[i] * f[n + i];
+    }
+}
+
+/* The nodes where the transform of the weight is not 0: from..to-1. */
+static void extent(const double *f, int n, int *from, int *to)
+{
+    for (*from = 0; *from < n && hypot(f[*from], f[n + *from]) < 1e-40; ++*from)
+        ;
+    for (*to = n; *to > *from && hypot(f[*to - 1], f[n + *to - 1]) < 1e-40; --*to)
+        ;
 }
 
 /* Raw moments int W x^a y^b PSF over the nodes. */
 static void raw_moments(const struct nodes *g, const double *fx, const double *fy, double m[PSF_MOMENTS])
 {
-    int n = g->n;
+    const int n = g->n;
+    int left, right, low, high;
     memset(m, 0, PSF_MOMENTS * sizeof *m);
-    for (int j = 0; j < n; j++) {
+    extent(fx, n, &left, &right);
+    extent(fy, n, &low, &high);
+    for (int j = low; j < high; j++) {
         const double *re = g->re + (size_t)j * (size_t)n, *im = g->im ? g->im + (size_t)j * (size_t)n : NULL;
-        if (hypot(fy[2 * j], fy[2 * j + 1]) < 1e-40)
-            continue;
         for (int a = 0; a < 5; a++) {
             const double *f = fx + 2 * (size_t)a * (size_t)n;
-            double sr = 0, si = 0;
-            for (int i = 0; i < n; i++) {
-                sr += re[i] * f[2 * i];
-                si += re[i] * f[2 * i + 1];
-            }
-            for (int i = 0; im && i < n; i++) {
-                sr -= im[i] * f[2 * i + 1];
-                si += im[i] * f[2 * i];
-            }
+            double r[2], s[2] = {0};
+            two_sums(re, f, n, left, right, r);
+            if (im)
+                two_sums(im, f, n, left, right, s);
+            const double sr = r[0] - s[1], si = r[1] + s[0];
             for (int b = 0; a + b < 5; b++) {
-                const double *q = fy + 2 * ((size_t)b * (size_t)n + (size_t)j);
-                m[psf_moment_index(a, b)] += sr * q[0] - si * q[1];
+                const double *q = fy + 2 * (size_t)b * (size_t)n + j;
+                m[psf_moment_index(a, b)] += sr * q[0] - si * q[n];
             }
         }
     }

@@ -3,11 +3,12 @@
  * between numbers and text that catalogues use.
  *
  * Text to number is exact: up to 15 digits and powers of ten up to 22 by one
- * correctly rounded operation, everything else by the C library.  Number to
+ * correctly rounded operation, up to 19 digits by decimal.h, the rest by the C library.  Number to
  * text gives as few digits as read back to the same bits.  Nothing depends on
  * the locale as long as no program sets one.
  */
 #include "table.h"
+#include "decimal.h"
 #include <assert.h>
 #include <math.h>
 #include <stdio.h>
@@ -116,7 +117,7 @@ int table_scan_real(const char *text, size_t len, double *value)
         v = 0;
     else if (kept <= 19 && m <= (UINT64_C(1) << 53) && e10 >= -22 && e10 <= 22)
         v = e10 < 0 ? (double)m / ten_to[-e10] : (double)m * ten_to[e10];
-    else
+    else if (kept > 19 || decimal_value(m, e10, &v))
         return scan_library(text, len, value);
     *value = minus ? -v : v;
     return OK;
@@ -204,26 +205,12 @@ size_t table_print_real(char *to, double x)
         to[0] = '0';
         return 1;
     }
-    /*
-     * When x is the nearest double to n / 10^p with n of 15 digits, that
-     * decimal is the only one of 15 digits that reads back to x.  n < 2^53 and
-     * p <= 22 make the division correctly rounded, so the test is exact.
-     */
-    int first = 15;
-    if (a >= 1e-7 && a < 1e15) {
-        int e = decade(a), p = 14 - e;
-        uint64_t n = (uint64_t)rint(a * ten_to[p]);
-        if (n >= 1000000000000000u && p > 0) {
-            n = (uint64_t)rint(a * ten_to[--p]);
-            e++;
-        }
-        if ((double)n / ten_to[p] == a)
-            return print_decimal(to, x < 0, n, 15, e);
-        first = 16;
-    }
+    struct decimal d;
+    if (decimal_of(a, &d) == OK)
+        return print_decimal(to, x < 0, d.n, d.digits, d.e);
     char s[TABLE_PRINT + 8];
     int len = 0;
-    for (int digits = first; digits <= 17; digits++) {
+    for (int digits = 15; digits <= 17; digits++) {
         len = snprintf(s, sizeof s, "%.*g", digits, x);
         if (digits == 17 || !isfinite(x) || strtod(s, NULL) == x)
             break;
