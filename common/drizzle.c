@@ -19,6 +19,9 @@ static double rounded(double v)
     return (v + magic) - magic;
 }
 
+/* Flux and weight of a pixel as one. */
+typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
+
 /* ---- drops ---- */
 
 struct job {
@@ -116,22 +119,6 @@ struct columns {
     int *cell;               /* the one cell of the band that gets all, -1: see the span */
 };
 
-/* Drops of a row that fall on one cell each; `sum` and `context` are those of the output row. */
-static void row_copied(const struct drizzle_input *in, const float *pix, const int *cell, double *sum, uint32_t *context)
-{
-    const double w = in->w, scale = in->scale;
-    for (long x = 0; x < in->nx; x++) {
-        const double d = scale * (double)pix[x];
-        const long c = cell[x];
-        if (c < 0 || isnan(d))
-            continue;
-        sum[2 * c] += w * d;
-        sum[2 * c + 1] += w;
-        if (context)
-            context[c] |= in->bit;
-    }
-}
-
 /* One row of drops between the spans of its columns and s. */
 static void row_boxes(struct job *j, const struct columns *col, const struct span *s, size_t row)
 {
@@ -150,6 +137,38 @@ static void row_boxes(struct job *j, const struct columns *col, const struct spa
     }
 }
 
+/* n drops of one row, `stride` cells apart, from the first cell of `sum` and `context` on. */
+static void row_combed(const struct drizzle_input *in, const float *pix, long n, long stride, double *sum, uint32_t *context)
+{
+    const double w = in->w, scale = in->scale;
+    for (long x = 0; x < n; x++) {
+        const double d = scale * (double)pix[x];
+        if (!isnan(d))
+            *(pair *)(sum + 2 * stride * x) += (pair){w * d, w};
+    }
+    for (long x = 0; x < n && context; x++)
+        if (!isnan(scale * (double)pix[x]))
+            context[stride * x] |= in->bit;
+}
+
+/* Rows of drops that all fall on one cell each, at even distances. */
+static int rows_combed(struct job *j)
+{
+    const struct drizzle_map *m = j->map;
+    const struct drizzle_input *in = j->in;
+    const struct drizzle_comb *comb = in->comb;
+    struct drizzle_band *b = j->band;
+    for (long y = 0; y < in->ny; y++) {
+        const struct span s = span_of(m->y0 + m->yy * (double)(in->y0 + y), 0.5 * j->pixfrac * m->yy);
+        if (s.first < b->y0 || s.first >= b->y0 + b->ny)
+            continue;
+        const size_t at = (size_t)(s.first - b->y0) * (size_t)b->nx + (size_t)comb->cell;
+        row_combed(in, in->pix + (size_t)y * (size_t)in->nx + comb->first, comb->end - comb->first, comb->stride,
+                   b->sum + 2 * at, b->context ? b->context + at : NULL);
+    }
+    return OK;
+}
+
 /* Axes along axes: every column has its span, every row one. */
 static int rows_aligned(struct job *j)
 {
@@ -158,23 +177,18 @@ static int rows_aligned(struct job *j)
     struct drizzle_band *b = j->band;
     const double half = 0.5 * j->pixfrac;
     const size_t n = (size_t)in->nx;
+    if (in->comb && in->comb->stride && !in->weight && !in->bad && !in->var && in->w > 0)
+        return rows_combed(j);
     struct columns col = {malloc(n * sizeof *col.span), malloc(n * sizeof *col.cell)};
     const int st = col.span && col.cell ? OK : E_NOMEM;
-    int split = 0;
     for (size_t x = 0; x < n && st == OK; x++) {
         const struct span s = col.span[x] = span_of(m->x0 + m->xx * (double)x, half * m->xx);
         col.cell[x] = s.first == s.last && s.first >= 0 && s.first < b->nx ? (int)s.first : -1;
-        split |= s.last > s.first;
     }
     for (long y = 0; y < in->ny && st == OK; y++) {
         const struct span s = span_of(m->y0 + m->yy * (double)(in->y0 + y), half * m->yy);
-        const size_t row = (size_t)y * n, at = (size_t)(s.first - b->y0) * (size_t)b->nx;
-        if (s.last < b->y0 || s.first >= b->y0 + b->ny)
-            continue;
-        if (!split && s.first == s.last && !in->weight && !in->bad && !in->var && in->w > 0)
-            row_copied(in, in->pix + row, col.cell, b->sum + 2 * at, b->context ? b->context + at : NULL);
-        else
-            row_boxes(j, &col, &s, row);
+        if (s.last >= b->y0 && s.first < b->y0 + b->ny)
+            row_boxes(j, &col, &s, (size_t)y * n);
     }
     free(col.span);
     free(col.cell);
@@ -347,9 +361,6 @@ struct batch {
     struct overlap_edges edges;
     double area[OVERLAP_WINDOW * OVERLAP_WINDOW * OVERLAP_LANES];
 };
-
-/* Flux and weight of a pixel as one. */
-typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
 
 /* A drop whose window lies in the band. */
 static inline __attribute__((always_inline))
@@ -716,6 +727,33 @@ int drizzle_splits(enum drizzle_kernel kernel, double pixfrac, const struct driz
     if (m->xx == 0 && m->yy == 0)
         return axis_splits(m->x0, m->xy, half, ny) || axis_splits(m->y0, m->yx, half, nx);
     return 1;
+}
+
+void drizzle_comb_make(struct drizzle_comb *comb, enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *m,
+                       long nx, long ny, long width)
+{
+    *comb = (struct drizzle_comb){0};
+    if ((kernel != DRIZZLE_SQUARE && kernel != DRIZZLE_POINT) || m->node_x || m->xy != 0 || m->yx != 0 ||
+        drizzle_splits(kernel, pixfrac, m, nx, ny))
+        return;
+    const double half = kernel == DRIZZLE_POINT ? 0 : 0.5 * pixfrac;
+    struct drizzle_comb c = {0};
+    for (long x = 0; x < nx; x++) {
+        const long cell = span_of(m->x0 + m->xx * (double)x, half * m->xx).first;
+        if (cell < 0 || cell >= width)
+            continue;
+        if (c.end == 0) {
+            c.first = x;
+            c.cell = cell;
+        } else if (c.end == c.first + 1) {
+            c.stride = cell - c.cell;
+        }
+        if (cell != c.cell + c.stride * (x - c.first))
+            return;
+        c.end = x + 1;
+    }
+    if (c.stride != 0)
+        *comb = c;
 }
 
 double drizzle_noise_factor(enum drizzle_kernel kernel, double pixfrac, double ratio)

@@ -60,6 +60,11 @@ void drizzle_map_line(const struct drizzle_map *m, double y, double *X, double *
 void drizzle_map_bounds(const struct drizzle_map *m, double x0, double y0, double x1, double y1,
                         double lo[2], double hi[2]);
 
+/* Columns first..end-1 of an exposure fall on cells cell, cell + stride, ..., the others elsewhere; stride 0: they do not. */
+struct drizzle_comb {
+    long first, end, cell, stride;
+};
+
 /* Some rows of an exposure. */
 struct drizzle_input {
     long nx, y0, ny;
@@ -70,6 +75,7 @@ struct drizzle_input {
     double w;                /* weight of the exposure, multiplied with the map */
     double scale;            /* s above */
     uint32_t bit;            /* set in `context` where the exposure contributes */
+    const struct drizzle_comb *comb;     /* what drizzle_comb_make tells of it, or NULL */
 };
 
 /* Some rows of the output. */
@@ -93,6 +99,10 @@ MUST_CHECK int drizzle_rows(enum drizzle_kernel kernel, double pixfrac, const st
  * interlaced squares), so that output pixels stay independent.
  */
 int drizzle_splits(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map, long nx, long ny);
+
+/* Where the columns of an nx x ny exposure fall when every drop falls on one pixel of an output of this width; saves time. */
+void drizzle_comb_make(struct drizzle_comb *comb, enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map,
+                       long nx, long ny, long width);
 
 /* Largest distance in output pixels between a drop's centre and a pixel centre it reaches. */
 double drizzle_reach(enum drizzle_kernel kernel, double pixfrac, const struct drizzle_map *map);

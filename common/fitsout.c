@@ -18,11 +18,10 @@
 
 enum { BLOCK = 128 << 10, CARD = 80, IMAGE_SIDE = 65535 };
 
-struct fits_out {
-    struct outfile *o;
-    char *name;
-    int n;                 /* HDUs begun */
-    char *head;            /* header of the HDU being written, whole blocks */
+/* An HDU that is not complete. */
+struct part {
+    int index;
+    char *head;            /* its header, whole blocks; NULL: no HDU */
     size_t head_size;
     size_t checksum_at, datasum_at;   /* of the two cards in head */
     uint64_t head_at;      /* of the header in the file */
@@ -31,7 +30,16 @@ struct fits_out {
     uint32_t sum;          /* ones' complement sum of the data */
     unsigned phase;        /* bytes of the data so far, modulo 4 */
     int bitpix;            /* of an image; 0 in tables */
-    long nx;
+    long nx, ny, nz;
+};
+
+struct fits_out {
+    struct outfile *o;
+    char *name;
+    int n;                 /* HDUs begun */
+    struct part now;       /* the one being written */
+    struct part *slot;     /* those whose rows come in any order */
+    int slots;
     unsigned char *block;
 };
 
@@ -109,30 +117,40 @@ static int emit(struct fits_out *f, const void *buf, size_t n, struct err *e)
     return st == E_NOMEM ? no_memory(f, e) : st ? cannot_write(f, e) : OK;
 }
 
+/* Bytes that fill the last block of an HDU's data. */
+static size_t padding(const struct part *p)
+{
+    return (FITS_BLOCK - (size_t)(p->size % FITS_BLOCK)) % FITS_BLOCK;
+}
+
+/* Checksums of an HDU that has all its data. */
+static int seal(struct fits_out *f, struct part *p, struct err *e)
+{
+    char text[CARD + 1], code[17];
+    if (p->left)
+        return err_set(e, E_RANGE, "%s: HDU %d: %llu bytes of data were not written", f->name,
+                       p->index, (unsigned long long)p->left);
+    snprintf(text, sizeof text, "DATASUM = '%-10u'         / data unit checksum", p->sum);
+    put_card(p->head + p->datasum_at, text);
+    encode(add_bytes(p->sum, 0, (unsigned char *)p->head, p->head_size), code);
+    memcpy(p->head + p->checksum_at + 11, code, 16);
+    if (outfile_patch(f->o, p->head_at, p->head, p->head_size))
+        return cannot_write(f, e);
+    free(p->head);
+    p->head = NULL;
+    return OK;
+}
+
+static const unsigned char zeros[FITS_BLOCK];
+
 /* Padding and checksums of the HDU before. */
 static int finish(struct fits_out *f, struct err *e)
 {
-    static const unsigned char zeros[FITS_BLOCK];
-    char text[CARD + 1], code[17];
-    if (!f->head)
+    if (!f->now.head)
         return OK;
-    if (f->left)
-        return err_set(e, E_RANGE, "%s: HDU %d: %llu bytes of data were not written", f->name,
-                       f->n - 1, (unsigned long long)f->left);
-    size_t pad = (size_t)(f->size % FITS_BLOCK);
-    int st = pad ? emit(f, zeros, FITS_BLOCK - pad, e) : OK;
-    if (st)
-        return st;
-
-    snprintf(text, sizeof text, "DATASUM = '%-10u'         / data unit checksum", f->sum);
-    put_card(f->head + f->datasum_at, text);
-    encode(add_bytes(f->sum, 0, (unsigned char *)f->head, f->head_size), code);
-    memcpy(f->head + f->checksum_at + 11, code, 16);
-    if (outfile_patch(f->o, f->head_at, f->head, f->head_size))
-        return cannot_write(f, e);
-    free(f->head);
-    f->head = NULL;
-    return OK;
+    size_t pad = f->now.left ? 0 : padding(&f->now);
+    int st = pad ? emit(f, zeros, pad, e) : OK;
+    return st ? st : seal(f, &f->now, e);
 }
 
 int fits_out_count(const struct fits_out *f)
@@ -147,34 +165,31 @@ int fits_out_begin(struct fits_out *f, const struct header *cards, uint64_t data
         return st;
     size_t n = cards->n + 3;
     size_t size = (n * CARD + FITS_BLOCK - 1) / FITS_BLOCK * FITS_BLOCK;
-    char *p = f->head = malloc(size);
+    char *p = malloc(size);
     if (!p)
         return no_memory(f, e);
+    f->now = (struct part){
+        .index = f->n, .head = p, .head_size = size, .checksum_at = cards->n * CARD, .datasum_at = (cards->n + 1) * CARD,
+        .head_at = outfile_size(f->o), .left = data_size, .size = data_size,
+    };
     memset(p, ' ', size);
     for (size_t i = 0; i < cards->n; i++, p += CARD)
         memcpy(p, cards->card[i], CARD);
     put_card(p, "CHECKSUM= '0000000000000000'   / HDU checksum");
     put_card(p + CARD, "DATASUM = '0         '         / data unit checksum");
     put_card(p + 2 * CARD, "END");
-    f->checksum_at = cards->n * CARD;
-    f->datasum_at = f->checksum_at + CARD;
-    f->head_size = size;
-    f->head_at = outfile_size(f->o);
-    f->left = f->size = data_size;
-    f->sum = 0;
-    f->phase = 0;
-    f->bitpix = 0;
     f->n++;
-    return emit(f, f->head, size, e);
+    return emit(f, f->now.head, size, e);
 }
 
 int fits_out_bytes(struct fits_out *f, const void *buf, size_t n, struct err *e)
 {
-    if (n > f->left)
-        return err_set(e, E_RANGE, "%s: HDU %d: too many bytes of data", f->name, f->n - 1);
-    f->sum = add_bytes(f->sum, f->phase, buf, n);
-    f->phase = (unsigned)((f->phase + n) & 3);
-    f->left -= n;
+    struct part *p = &f->now;
+    if (n > p->left)
+        return err_set(e, E_RANGE, "%s: HDU %d: too many bytes of data", f->name, p->index);
+    p->sum = add_bytes(p->sum, p->phase, buf, n);
+    p->phase = (unsigned)((p->phase + n) & 3);
+    p->left -= n;
     return emit(f, buf, n, e);
 }
 
@@ -205,7 +220,10 @@ void fits_out_abandon(struct fits_out *f)
     if (!f)
         return;
     outfile_abandon(f->o);
-    free(f->head);
+    for (int i = 0; i < f->slots; i++)
+        free(f->slot[i].head);
+    free(f->slot);
+    free(f->now.head);
     free(f->block);
     free(f->name);
     free(f);
@@ -214,6 +232,11 @@ void fits_out_abandon(struct fits_out *f)
 int fits_out_commit(struct fits_out *f, struct err *e)
 {
     int st = f->n ? finish(f, e) : err_set(e, E_RANGE, "%s: no HDU was written", f->name);
+    for (int i = 0; i < f->slots && st == OK; i++) {
+        struct part *p = &f->slot[i];
+        const uint64_t end = p->head_at + p->head_size + p->size;
+        st = outfile_patch(f->o, end, zeros, padding(p)) ? cannot_write(f, e) : seal(f, p, e);
+    }
     if (st == OK) {
         st = outfile_commit(f->o, e);
         f->o = NULL;
@@ -278,8 +301,10 @@ int fits_out_hdu(struct fits_out *f, int bitpix, long nx, long ny, long nz, cons
                                               : fits_out_begin(f, &c, size, e);
     header_free(&c);
     if (st == OK) {
-        f->bitpix = bitpix;
-        f->nx = nx;
+        f->now.bitpix = bitpix;
+        f->now.nx = nx;
+        f->now.ny = ny;
+        f->now.nz = nz;
     }
     return st;
 }
@@ -311,20 +336,27 @@ WIDE static uint64_t swap64(unsigned char *restrict out, const void *restrict in
     return sum;
 }
 
+/* k values into f->block, and into the sum of p. */
+static void swap_block(struct fits_out *f, struct part *p, const char *in, size_t k)
+{
+    uint64_t sum = abs(p->bitpix) == 32 ? swap32(f->block, in, k) : swap64(f->block, in, k);
+    p->sum = fold((uint64_t)p->sum + fold(sum));
+    p->left -= k * (size_t)abs(p->bitpix) / 8;
+}
+
 static int put_rows(struct fits_out *f, int bitpix, long nrow, const void *pix, struct err *e)
 {
-    size_t bytes = (size_t)abs(bitpix) / 8, n = (size_t)nrow * (size_t)f->nx;
-    if (nrow < 0 || bitpix != f->bitpix || n > f->left / bytes)
-        return err_set(e, E_RANGE, "%s: HDU %d: rows that do not fit the image", f->name, f->n - 1);
+    struct part *p = &f->now;
+    size_t bytes = (size_t)abs(bitpix) / 8, n = (size_t)nrow * (size_t)p->nx;
+    if (nrow < 0 || bitpix != p->bitpix || n > p->left / bytes)
+        return err_set(e, E_RANGE, "%s: HDU %d: rows that do not fit the image", f->name, p->index);
     const char *in = pix;
     while (n) {
         size_t k = n < BLOCK / bytes ? n : BLOCK / bytes;
-        uint64_t sum = bytes == 4 ? swap32(f->block, in, k) : swap64(f->block, in, k);
-        f->sum = fold((uint64_t)f->sum + fold(sum));
+        swap_block(f, p, in, k);
         int st = emit(f, f->block, k * bytes, e);
         if (st)
             return st;
-        f->left -= k * bytes;
         in += k * bytes;
         n -= k;
     }
@@ -344,6 +376,46 @@ int fits_out_rows_double(struct fits_out *f, long nrow, const double *pix, struc
 int fits_out_rows_int(struct fits_out *f, long nrow, const int32_t *pix, struct err *e)
 {
     return put_rows(f, 32, nrow, pix, e);
+}
+
+int fits_out_slot(struct fits_out *f, int bitpix, long nx, long ny, long nz, const struct header *h, int *slot, struct err *e)
+{
+    struct part *more = realloc(f->slot, ((size_t)f->slots + 1) * sizeof *more);
+    if (!more)
+        return no_memory(f, e);
+    f->slot = more;
+    int st = fits_out_hdu(f, bitpix, nx, ny, nz, h, e);
+    if (st)
+        return st;
+    st = outfile_skip(f->o, f->now.size + padding(&f->now));
+    if (st)
+        return st == E_NOMEM ? no_memory(f, e) : cannot_write(f, e);
+    *slot = f->slots;
+    f->slot[f->slots++] = f->now;
+    f->now.head = NULL;
+    return OK;
+}
+
+int fits_out_slot_rows(struct fits_out *f, int slot, long z, long y0, long nrow, const void *pix, struct err *e)
+{
+    struct part *p = slot >= 0 && slot < f->slots ? &f->slot[slot] : NULL;
+    if (!p || z < 0 || z >= p->nz || y0 < 0 || nrow < 0 || nrow > p->ny - y0)
+        return err_set(e, E_RANGE, "%s: slot %d: rows that do not fit the image", f->name, slot);
+    size_t n = (size_t)nrow * (size_t)p->nx;
+    uint64_t at = p->head_at + p->head_size + 4 * ((uint64_t)z * (uint64_t)p->ny + (uint64_t)y0) * (uint64_t)p->nx;
+    if (4 * (uint64_t)n > p->left)
+        return err_set(e, E_RANGE, "%s: HDU %d: rows that were written already", f->name, p->index);
+    for (const char *in = pix; n;) {
+        size_t k = n < BLOCK / 4 ? n : BLOCK / 4;
+        swap_block(f, p, in, k);
+        int st = outfile_patch(f->o, at, f->block, 4 * k);
+        if (st)
+            return st == E_NOMEM ? no_memory(f, e) : cannot_write(f, e);
+        at += 4 * k;
+        in += 4 * k;
+        n -= k;
+    }
+    return OK;
 }
 
 int image_write(const struct image *im, const char *name, const char *record,

@@ -95,6 +95,15 @@ MUST_CHECK int fits_out_rows(struct fits_out *f, long nrow, const float *pix, st
 MUST_CHECK int fits_out_rows_double(struct fits_out *f, long nrow, const double *pix, struct err *e);
 MUST_CHECK int fits_out_rows_int(struct fits_out *f, long nrow, const int32_t *pix, struct err *e);
 
+/*
+ * An image HDU whose rows come in any order, also while later HDUs are written: begins it and
+ * leaves room for its data.  *slot is its name, 0, 1, ...  bitpix -32 or 32.
+ */
+MUST_CHECK int fits_out_slot(struct fits_out *f, int bitpix, long nx, long ny, long nz, const struct header *h,
+                             int *slot, struct err *e);
+/* nrow rows of a slot from row y0 of plane z; float or int32_t as its bitpix says.  Each row must come once. */
+MUST_CHECK int fits_out_slot_rows(struct fits_out *f, int slot, long z, long y0, long nrow, const void *pix, struct err *e);
+
 /* Finish and make the file appear; frees f whatever happens. */
 MUST_CHECK int fits_out_commit(struct fits_out *f, struct err *e);
 void fits_out_abandon(struct fits_out *f);

@@ -370,6 +370,23 @@ int outfile_write(struct outfile *o, const void *buf, size_t n)
     return OK;
 }
 
+int outfile_skip(struct outfile *o, uint64_t n)
+{
+    if (o->status)
+        return failed(o, o->status);
+    if (n <= o->limit - o->n) {
+        int st = reserve(o, o->n + (size_t)n);
+        if (st)
+            return st;
+        memset(o->buf + o->n, 0, (size_t)n);
+        o->n += (size_t)n;
+        return OK;
+    }
+    int st = flush(o);
+    o->base += st == OK ? n : 0;
+    return st;
+}
+
 int outfile_patch(struct outfile *o, uint64_t offset, const void *buf, size_t n)
 {
     if (o->status)

@@ -42,6 +42,36 @@ dither -n 2 fine.fits | addnoise -s 3 | drizzle -x 0.1 --pixfrac 0.5 --flat >p.f
 $F dump p.fits 0 | sort -k2n -k1n >p.txt
 same "through pipes" p.txt got.txt
 
+# ---- a list of displacements: the same sums as the WCS gives
+printf '# EXPNUM DX DY\n1 0 0\n2 .5 0\n3 .5 .5\n4 0 .5\n' >shift.txt
+drizzle noisy.fits -x 0.1 --pixfrac 0.5 --shift shift.txt -o s.fits
+for h in 1 2 3; do $F dump d.fits $h >a.txt; $F dump s.fits $h >b.txt; same "--shift: HDU $h as through the WCS" a.txt b.txt; done
+near "--shift: CRPIX1 as through the WCS" "$($F card s.fits 1 CRPIX1)" "$($F card d.fits 1 CRPIX1)" 1e-9
+printf '# DX DY FILE\n0 .5 noisy.fits[SCI,4]\n.5 0 noisy.fits[SCI,2]\n.5 .5 noisy.fits[SCI,3]\n0 0 noisy.fits[SCI,1]\n' >file.txt
+drizzle noisy.fits -x 0.1 --pixfrac 0.5 --shift file.txt --flat -o s2.fits
+$F dump s2.fits 0 >b.txt; $F dump d.fits 1 >a.txt; same "--shift: rows named by FILE" a.txt b.txt
+# without a WCS: a ramp turned by a right angle about its middle, and one of half-size pixels
+$F make ramp.fits 20 20 '100 + 3 * $x + 7 * $y'; $F make turn.fits 20 20 '100 + 3 * (20 - 1 - $y + 2) + 7 * ($x - 1)'
+printf '# DX DY ROT SCALE\n0 0 0 1\n2 -1 90 1\n' >turn.txt
+drizzle ramp.fits turn.fits --shift turn.txt -o t.fits
+near "--shift: ROT 90: pixels that differ from the ramp" "$($F dump t.fits 1 | perl -ne '@a = split; next if $a[2] =~ /nan/i; $b++ if abs($a[2] - (100 + 3 * $a[0] + 7 * ($a[1] - 1))) > 1e-4; $n++; END { print $n == 20 * 20 + 20 * 20 - 18 * 19 ? $b + 0 : "pixels $n" }')" 0 0
+near "--shift: without a scale no PIXSCALE" "$($F card t.fits 1 PIXSCALE | wc -w)" 0 0
+$F make fineramp.fits 20 20 '25 + 0.75 * 0.5 * ($x + 9.5) + 1.75 * 0.5 * ($y + 9.5)'
+printf '# DX DY ROT SCALE\n0 0 0 0.5\n0 0 0 1\n' >scale.txt
+drizzle fineramp.fits --units mean --shift <(head -2 scale.txt) -x 1 -o t.fits
+near "--shift: SCALE 0.5: its sum" "$($F stat t.fits 1 | cut -d' ' -f5)" 100 0
+near "--shift: SCALE 0.5: pixels that differ from the ramp" "$($F dump t.fits 1 | perl -ne '@a = split; next if $a[2] =~ /nan/i; $b++ if abs($a[2] - (100 + 3 * $a[0] + 7 * $a[1])) > 1e-4; END { print $b + 0 }')" 0 0
+drizzle ramp.fits --shift <(printf '# DX DY\n0 0\n') -x 0.5 --pixfrac 0.5 -o t.fits
+near "--shift: -x in pixels of the frame" "$($F card t.fits 1 NAXIS1)" 39 0
+printf '# DX DY\n0 0\n' >one.txt; fails "--shift: too few rows" 1 drizzle noisy.fits --shift one.txt -o no.fits
+printf '# DX EXPNUM\n0 1\n' >bad.txt; fails "--shift: no DY" 1 drizzle noisy.fits --shift bad.txt -o no.fits
+printf '# EXPNUM DX DY\n1 0 0\n2 1 1\n2 3 3\n4 0 0\n' >bad.txt; fails "--shift: two rows for one" 1 drizzle noisy.fits --shift bad.txt -o no.fits
+printf '# EXPNUM DX DY\n1 0 0\n2 1 nan\n3 3 3\n4 0 0\n' >bad.txt; fails "--shift: nan" 1 drizzle noisy.fits --shift bad.txt -o no.fits
+printf '# EXPNUM DX DY\n1 0 0\n2 1 0\n3 3 3\n' >bad.txt; fails "--shift: a missing row" 1 drizzle noisy.fits --shift bad.txt -o no.fits
+printf '# DX DY SCALE\n0 0 0\n' >bad.txt; fails "--shift: scale 0" 1 drizzle ramp.fits --shift bad.txt -o no.fits
+fails "--shift and --rotation" 2 drizzle noisy.fits --shift shift.txt --rotation 3 -o no.fits
+fails "output is the list" 1 drizzle noisy.fits --shift shift.txt -o shift.txt
+
 # ---- order of the operands, threads
 for e in 1 2 3 4; do addnoise -q --saturate 1e9 -s 3 "four.fits[SCI,$e]" -o e$e.fits; done
 drizzle e1.fits e2.fits e3.fits e4.fits -x 0.07 --pixfrac 0.9 -o o1.fits
@@ -49,6 +79,14 @@ drizzle e3.fits e1.fits e4.fits e2.fits -x 0.07 --pixfrac 0.9 -o o2.fits
 same "order of the operands" o1.fits o2.fits
 drizzle -j 2 e1.fits e2.fits e3.fits e4.fits -x 0.07 --pixfrac 0.9 -o o2.fits
 same "1 and 2 threads" o1.fits o2.fits
+# lists of operands
+printf '# exposures\n e2.fits\ne1.fits \n\n' >two.lst; printf 'e4.fits\n' >rest.lst
+drizzle @two.lst e3.fits @rest.lst -x 0.07 --pixfrac 0.9 -o o2.fits
+same "@list: the same bytes" o1.fits o2.fits
+printf 'a\001b\n' >bin.lst; fails "@list: not a list" 1 drizzle @bin.lst -o no.fits
+printf '# nothing\n' >no.lst; fails "@list: empty" 1 drizzle @no.lst -o no.fits
+fails "@list: missing" 1 drizzle @gone.lst -o no.fits
+cp e1.fits @two.lst; drizzle @two.lst -x 0.1 -o o3.fits; near "@list: a file of that very name wins" "$($F card o3.fits 1 NCOMBINE)" 1 0; rm @two.lst
 drizzle -j 7 --kernel lanczos3 e1.fits e2.fits -x 0.07 -o o1.fits; drizzle --kernel lanczos3 e1.fits e2.fits -x 0.07 -o o2.fits
 same "1 and 7 threads, lanczos3" o1.fits o2.fits
 # without EXPNUM the content decides
@@ -69,6 +107,18 @@ for u in total:200 rate:0.5 mean:125; do
     near "--units ${u%:*}: MAGZERO" "$(awk -v v="$(middle u.fits)" -v z="$($F card u.fits 1 MAGZERO)" 'BEGIN { print z - 2.5 * log(v) / log(10) }')" "$(awk 'BEGIN { print 25 - 2.5 * log(0.5) / log(10) }')" 1e-5
     near "--units ${u%:*}: GAIN times value = electrons" "$(awk -v v="$(middle u.fits)" -v g="$($F card u.fits 1 GAIN)" 'BEGIN { print v * g }')" 200 1e-3
 done
+# what was collected in EXPTIME: a stack can go through drizzle again with the exposures it was made of
+for u in total mean; do
+    drizzle a.fits b.fits -x 0.1 --units $u -o u.fits
+    near "--units $u: MAGZERO - 2.5 log10(EXPTIME)" "$(awk -v z="$($F card u.fits 1 MAGZERO)" -v t="$($F card u.fits 1 EXPTIME)" 'BEGIN { printf "%.10f", z - 2.5 * log(t) / log(10) }')" 25 1e-8
+    ok "--units $u: and again with an exposure" drizzle u.fits a.fits -o again.fits
+    near "--units $u: TOTTIME" "$($F card u.fits 1 TOTTIME)" 400 1e-9
+done
+$F make adu.fits 15 15 200 "EXPTIME = 100.0" "BUNIT   = 'adu'" "${W1[@]}"
+drizzle adu.fits --units rate -o u.fits
+[ "$($F card u.fits 1 BUNIT)" = adu/s ] && pass "--units rate: BUNIT adu/s" || fail "--units rate: BUNIT $($F card u.fits 1 BUNIT)"
+drizzle a.fits b.fits -x 0.1 --units rate -o u.fits
+[ "$($F card u.fits 1 BUNIT)" = electron/s ] && pass "--units rate: BUNIT" || fail "--units rate: BUNIT $($F card u.fits 1 BUNIT)"
 near "NOISECOR, r = 2" "$($F card u.fits 1 NOISECOR)" 2.4 1e-9
 drizzle a.fits -o same.fits --flat
 near "one exposure on its own grid: unchanged" "$($F stat same.fits 0 | cut -d' ' -f1-5 | tr ' ' _ | sed 's/^200_0_200_200_225$/1/')" 1 0
