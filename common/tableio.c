@@ -842,6 +842,18 @@ static void put_safe(struct sink *k, const char *text)
         put(k, (unsigned char)*text < 32 || *text == 127 ? "?" : text, 1);
 }
 
+/* A unit or a description: in a header, brackets surround the unit and a comma ends it. */
+static void put_plain(struct sink *k, const char *text, int unit)
+{
+    for (; *text; text++)
+        if (*text == '[' || *text == ']')
+            put(k, *text == '[' ? "(" : ")", 1);
+        else if (unit && *text == ',')
+            put(k, ";", 1);
+        else
+            put(k, (unsigned char)*text < 32 || *text == 127 ? "?" : text, 1);
+}
+
 static void put_padded(struct sink *k, const char *text, size_t width)
 {
     size_t n = strlen(text);
@@ -898,10 +910,10 @@ static void put_header(struct sink *k, const struct table *t, const char *record
         snprintf(s, sizeof s, "# %3zu ", i + 1);
         put_text(k, s);
         put_padded(k, c->name, width + 1);
-        put_safe(k, c->what[0] ? c->what : "no description");
+        put_plain(k, c->what[0] ? c->what : "no description", 0);
         if (c->unit[0]) {
             put_text(k, " [");
-            put_safe(k, c->unit);
+            put_plain(k, c->unit, 1);
             put_text(k, "]");
         }
         put_text(k, "\n");
@@ -912,11 +924,11 @@ static void put_header(struct sink *k, const struct table *t, const char *record
         put_text(k, s);
         put_padded(k, c->name, width + 1);
         put_text(k, "[");
-        put_safe(k, c->unit);
+        put_plain(k, c->unit, 1);
         put_text(k, ",");
         put_type(k, c, t->nrow);
         put_text(k, "] ");
-        put_safe(k, c->what[0] ? c->what : "no description");
+        put_plain(k, c->what[0] ? c->what : "no description", 0);
         put_text(k, "\n");
     }
     for (size_t i = 0; i < t->nkey; i++) {

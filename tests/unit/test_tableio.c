@@ -195,6 +195,22 @@ static void test_header_text(void)
     table_free(&t);
 }
 
+/* A comma in a unit or a bracket in a description must not end them in the file that we write. */
+static void test_unit_text(void)
+{
+    struct table t, back = {0};
+    struct err e = {""};
+    int st = read_text(&t, "# ID X\n#   1 ID first number\n#   2 X Centroid [of light] along x [pix,el]\n7 1.5\n", &e);
+    check_that(st == OK && strcmp(t.col[1].unit, "pix,el") == 0, "unit '%s' (%s)", st ? "" : t.col[1].unit, e.text);
+    st = st ? st : table_write(&t, "unit.txt", NULL, NULL, 0, &e);
+    st = st ? st : table_read(&back, "unit.txt", memory, &e);
+    check_that(st == OK && back.ncol == 2 && table_number(&back.col[1], 0) == 1.5, "it is written so that it can be read (%s)", e.text);
+    check_that(st == OK && strcmp(back.col[1].unit, "pix;el") == 0 && strcmp(back.col[1].what, "Centroid (of light) along x") == 0,
+               "as unit '%s' and description '%s'", st ? "" : back.col[1].unit, st ? "" : back.col[1].what);
+    table_free(&t);
+    table_free(&back);
+}
+
 static void test_real_catalogue(void)
 {
     char name[1000];
@@ -247,6 +263,7 @@ int main(void)
     test_forms();
     test_round_trip();
     test_header_text();
+    test_unit_text();
     test_real_catalogue();
     test_speed();
     return check_status();
