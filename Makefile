@@ -105,10 +105,15 @@ bench: all    # accuracy and time of every program, against its peers where inst
 accuracy: all $(TOOLS)    # what accuracy costs in time: measured curves, table and figure
 	$(MAKE) -C examples/accuracy
 
-quick: all    # the small experiment: a few minutes, table and figures in examples/pixelscale/quick
+# all cores for building, too, unless make was told how many
+JOBS      = $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 1))
+
+quick: $(filter deps,$(MAKECMDGOALS))    # the small experiment: a minute, table and figures in examples/pixelscale/quick
+	$(MAKE) $(JOBS) all
 	$(MAKE) -C examples/pixelscale quick $(if $(GALAXIES),GALAXIES=$(abspath $(GALAXIES)))
 
-paper: all    # the whole experiment of High et al. (2007)
+paper: $(filter deps,$(MAKECMDGOALS))    # the whole experiment of High et al. (2007): some minutes
+	$(MAKE) $(JOBS) all
 	$(MAKE) -C examples/pixelscale paper $(if $(GALAXIES),GALAXIES=$(abspath $(GALAXIES)))
 
 calibration: all    # how good the shears are: slopes and biases with errors on 24 fields; half an hour

@@ -10,7 +10,6 @@
 #include "fitswalk.h"
 #include "outfile.h"
 #include "simd.h"
-#include "suffix.h"
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -202,8 +201,6 @@ int fits_out_open(struct fits_out **out, const char *name, const char *const *in
     *out = NULL;
     if (!strcmp(name, "-") && isatty(STDOUT_FILENO))
         return err_set(e, E_IO, "standard output: is a terminal: redirect it or give a file name");
-    if (suffix_of(name) == SUFFIX_TEXT || suffix_of(name) == SUFFIX_FOREIGN)
-        return err_set(e, E_IO, "%s: FITS is written here: give it a name that ends in .fits", name);
     struct fits_out *f = calloc(1, sizeof *f);
     if (f) {
         f->name = strdup(strcmp(name, "-") ? name : "standard output");

@@ -11,7 +11,6 @@
 #include "imageio.h"
 #include "outfile.h"
 #include "source.h"
-#include "suffix.h"
 #include <errno.h>
 #include <float.h>
 #include <math.h>
@@ -984,8 +983,6 @@ static int write_text(const struct table *t, const char *name, const char *recor
                       size_t n_inputs, struct err *e)
 {
     const char *shown = strcmp(name, "-") == 0 ? "standard output" : name;
-    if (suffix_of(name) == SUFFIX_FOREIGN)
-        return err_set(e, E_IO, "%s: a catalogue is text, or a table in a name that ends in .fits", name);
     struct sink k = {.buf = malloc(SINK)};
     if (!k.buf)
         return err_set(e, E_NOMEM, "%s: %s", shown, err_text(E_NOMEM));
@@ -1032,7 +1029,8 @@ static int write_fits(const struct table *t, const char *name, const char *recor
 int table_write(const struct table *t, const char *name, const char *record, const char *const *inputs,
                 size_t n_inputs, struct err *e)
 {
-    if (suffix_of(name) == SUFFIX_FITS)
+    size_t n = strlen(name);
+    if (n > 5 && strcmp(name + n - 5, ".fits") == 0)
         return write_fits(t, name, record, inputs, n_inputs, e);
     return write_text(t, name, record, inputs, n_inputs, e);
 }

@@ -15,15 +15,17 @@ do for [t in "svg pdf png"] {
         set size 0.5,0.68; set origin left,0.32
         set title v eq "plain" ? "plain fourth moments, first-order PSF" : "exact fourth moments"
         set yrange [0.65:1.15]
+        set ytics 0.1
         set xlabel ""
-        set ylabel v eq "plain" ? "slope of {/Symbol g}_i against g_i" : ""
+        set ylabel v eq "plain" ? "slope of γ_i against g_i" : ""
         if (v eq "plain") { set key top left Left reverse samplen 1 } else { unset key }
         plot 1 with lines lc rgb "#888888" dt 3 notitle, \
             for [i=1:4] for [c=1:2] s=word(sets, i) fom(v, s, sprintf("BPAIR%d BPAIR%dSE", c, c)) using ($1+.0005*i):2:3 with yerrorbars pt (c == 1 ? 5 : 4) ps .5 lc rgb shade(s) title c == 1 ? name(s) : "", \
             for [i=1:4] for [c=1:2] s=word(sets, i) fom(v, s, sprintf("LINE%d", c)) using 1:2 with lines lc rgb shade(s) dt c notitle
         set size 0.5,0.34; set origin left,0
         unset title
-        set yrange [-0.1:0.1]
+        set yrange [-0.12:0.12]
+        set ytics 0.1
         set xlabel theta_ccd
         set ylabel v eq "plain" ? "slope - line" : ""
         plot 0 with lines lc rgb "#888888" dt 3 notitle, \

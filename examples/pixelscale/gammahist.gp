@@ -1,9 +1,9 @@
 # Distribution of the shear estimates; dashed: the Gaussian of the same rms.
 load "style.gp"
-one = "< awk -v s=%s -v x=%s '$1 == s && $2 == x { print $3, $4, $5 }' ".dir."/gammahist.cat"
+one = "< awk -v s=%s -v x=%s '$1 == s && $2 == x { print $3, $4, $6 }' ".dir."/gammahist.cat"
 list = system(sprintf("awk '!/^#/ && !seen[$1 $2]++ { printf \"%%s-%%s \", $1, $2 }' %s/gammahist.cat", dir))
 part(f, i) = i == 1 ? f[1:strstrt(f, "-")-1] : f[strstrt(f, "-")+1:*]
-set xlabel "shear estimate {/Symbol g}_1"
+set xlabel "shear estimate γ_1"
 set ylabel "probability density"
 set xrange [-1.5:1.5]
 set xtics 0.5

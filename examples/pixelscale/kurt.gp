@@ -6,10 +6,10 @@ set xtics 0.08
 do for [t in "svg pdf png"] {
     eval(out(t, "kurt"))
     set multiplot layout 1,2
-    set ylabel "kurtosis - 3 of {/Symbol g}_1"
-    set key top left Left reverse samplen 1
+    set ylabel "kurtosis - 3 of γ_1"
+    eval(above)
     plot [0.02:0.26] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) fom("exact", s, "KURT1 KURT1ERR") using 1:2:3 with yerrorbars ls i title name(s)
-    set ylabel "skewness of {/Symbol g}_1"
+    set ylabel "skewness of γ_1"
     unset key
     plot [0.02:0.26] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) fom("exact", s, "SKEW1 SKEW1ERR") using 1:2:3 with yerrorbars ls i notitle
     unset multiplot

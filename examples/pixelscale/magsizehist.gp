@@ -6,7 +6,7 @@ part(f, i) = i == 1 ? f[1:strstrt(f, "-")-1] : f[strstrt(f, "-")+1:*]
 do for [t in "svg pdf png"] {
     eval(out(t, "magsizehist"))
     set multiplot layout 1,2
-    set key top left Left reverse samplen 1
+    eval(above)
     set yrange [0:*]
     set ylabel "usable galaxies / arcmin^{-2} per bin"
     set xlabel "AB magnitude"

@@ -1,7 +1,7 @@
 # Spread of the ellipticities (dashed) and of the shear estimates.
 load "style.gp"
 set xlabel theta_ccd
-set ylabel "{/Symbol s}_e (dashed), {/Symbol s}_{/Symbol g}"
+set ylabel "σ_e (dashed), σ_γ"
 set offsets 0.01, 0.01, 0.02, 0.02
 set key top left Left reverse
 do for [t in "svg pdf png"] {

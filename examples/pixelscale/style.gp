@@ -13,6 +13,8 @@ set xtics 0.04
 svg(name) = sprintf("set terminal svg size 640,440 font 'Helvetica,13' background 'white'; set output '%s/%s.svg'", dir, name)
 pdf(name) = sprintf("set terminal pdfcairo size 16cm,11cm font 'Helvetica,11'; set output '%s/%s.pdf'", dir, name)
 png(name) = sprintf("set terminal pngcairo size 800,550 font 'Helvetica,12' background 'white'; set output '%s/%s.png'", dir, name)
+# a key above all panels
+above = "set key at screen 0.5, 0.99 center top horizontal Left reverse samplen 1.5 maxcols 4; set tmargin 7"
 # the terminal of a format, and what the figures share
 out(format, name) = format eq "svg" ? svg(name) : format eq "pdf" ? pdf(name) : png(name)
 sets = "sim1 sim1d sim2 sim2d"
@@ -20,5 +22,5 @@ name(s) = s eq "sim1" ? "Sim 1" : s eq "sim1d" ? "Sim 1 drizzled" : s eq "sim2" 
 step(s) = s eq "sim1d" || s eq "sim2d" ? 0.5 : 1
 fom(v, s, c) = sprintf("< ./pick %s/fom-%s.cat %s CCDSCALE %s", dir, v, s, c)
 own(f, s, c) = sprintf("< ./pick %s/%s.cat %s CCDSCALE %s", dir, f, s, c)
-theta_ccd = "CCD pixel scale {/Symbol q}_{ccd} / arcsec"
-theta_s = "pixel scale of the image {/Symbol q}_s / arcsec"
+theta_ccd = "CCD pixel scale θ_{ccd} / arcsec"
+theta_s = "pixel scale of the image θ_s / arcsec"

@@ -7,7 +7,7 @@ ln -s "$BIN" here/bin
 cd here/examples/pixelscale || exit 1
 rm -rf quick* paper* tiny*
 # the catalogues of two fields under three shears, and the pictures' numbers
-catalogues() { (cd "$1" && find . -maxdepth 1 \( -name '*.use' -o -name '*.cat' -o -name '*.rrg' -o -name '*.scene' -o -name '*.models' -o -name 'table.txt' -o -name 'psf*.fits' \) | sort | xargs sha256sum); }
+catalogues() { (cd "$1" && find . -maxdepth 1 \( -name '*.use.fits' -o -name '*.cat' -o -name '*.rrg' -o -name '*.scene' -o -name '*.models' -o -name 'table.txt' -o -name 'psf*.fits' \) | sort | xargs sha256sum); }
 begin=$(date +%s%N)
 make -s tiny FIGURES= PICTURES= >log 2>&1 || fail "the tiny experiment fails: $(tail -3 log)"
 alone=$(($(date +%s%N) - begin))    # nanoseconds, the measure of the moments below
@@ -29,12 +29,12 @@ same "six times killed and resumed: the same bytes" whole resumed
 ok "no temporary file is left" test -z "$(find tiny -name '.*.tmp' -o -path 'tiny/work/*')"
 
 # an image that is asked for again is made again, the catalogues stay
-rm tiny/sim1-0.10-1a.plain.use
+rm tiny/sim1-0.10-1a.plain.use.fits
 make -s tiny FIGURES= PICTURES= KEEP=1 >log 2>&1
 catalogues tiny >again
 same "a lost catalogue is made again, the same bytes" whole again
 ok "KEEP=1 keeps image and segmentation" test -s tiny/work/sim1-0.10-1a.fits -a -s tiny/work/sim1-0.10-1a.seg.fits
 # a step that fails names itself and leaves nothing
-rm tiny/sim1-0.10-1a.plain.use
+rm tiny/sim1-0.10-1a.plain.use.fits
 make -s tiny FIGURES= PICTURES= SNR=nonsense >log 2>&1 && fail "a failing step must fail the run" || pass "a failing step fails the run"
 ok "and names itself" grep -q '^cutcat: ' log
