@@ -179,6 +179,7 @@ int fits_out_begin(struct fits_out *f, const struct header *cards, uint64_t data
     put_card(p + CARD, "DATASUM = '0         '         / data unit checksum");
     put_card(p + 2 * CARD, "END");
     f->n++;
+    outfile_expect(f->o, size + data_size + padding(&f->now));
     return emit(f, f->now.head, size, e);
 }
 

@@ -32,6 +32,9 @@ int outfile_same(const char *a, const char *b);
 /* Append n bytes, buffered. */
 MUST_CHECK int outfile_write(struct outfile *o, const void *buf, size_t n);
 
+/* n more bytes will come: a hint that makes them cheaper. */
+void outfile_expect(struct outfile *o, uint64_t n);
+
 /* Append n zero bytes, to be overwritten; a large number of them costs nothing. */
 MUST_CHECK int outfile_skip(struct outfile *o, uint64_t n);
 

@@ -121,43 +121,44 @@ static int add_shot(struct band *b, const struct shot *t, struct err *e)
 
 enum { LANES = 16 };
 
-/* LANES quotients, and whether all weights are `same`, whose reciprocal is `inverse`. */
-static inline __attribute__((always_inline))
-void divide_lanes(const double *restrict sum, double same, double inverse, float fill, float *restrict image)
+static inline uint64_t bits_of(double v)
 {
-    double q[LANES];
-    int differ = 0;
-    for (int k = 0; k < LANES; k++)
-        differ |= !(sum[2 * k + 1] >= same && sum[2 * k + 1] <= same);
-    if (differ)
-        for (int k = 0; k < LANES; k++)
-            q[k] = 1 / sum[2 * k + 1];
-    else
-        for (int k = 0; k < LANES; k++)
-            q[k] = inverse;
-    for (int k = 0; k < LANES; k++) {
-        const double w = sum[2 * k + 1];
-        const float v = (float)(sum[2 * k] * q[k]);
-        image[k] = w < 0 || w > 0 ? v : fill;
-    }
+    uint64_t b;
+    memcpy(&b, &v, sizeof b);
+    return b;
 }
 
-/* n pixels: flux times the reciprocal of the weight, `fill` where that is 0. */
+/* Flux times the reciprocal of the weight, `fill` where that is 0. */
+static inline float quotient(const double *sum, float fill)
+{
+    const double w = sum[1];
+    return w < 0 || w > 0 ? (float)(sum[0] * (1 / w)) : fill;
+}
+
+/* n quotients; neighbours mostly have the same weight. */
 WIDE static void divide(const double *restrict sum, size_t n, float fill, float *restrict image)
 {
-    double same = 0, inverse = 0;
+    double inverse = 0;
+    uint64_t same = 0;                 /* bits of the weight with that inverse */
     size_t i = 0;
     for (; i + LANES <= n; i += LANES) {
-        if (!(sum[2 * i + 1] >= same && sum[2 * i + 1] <= same)) {
-            same = sum[2 * i + 1];
-            inverse = 1 / same;
+        const double *s = sum + 2 * i;
+        if (bits_of(s[1]) != same) {
+            same = bits_of(s[1]);
+            inverse = 1 / s[1];
         }
-        divide_lanes(sum + 2 * i, same, inverse, fill, image + i);
+        uint64_t differ = 0;
+        for (int k = 0; k < LANES; k++)
+            differ |= bits_of(s[2 * k + 1]) ^ same;
+        if (differ || !(s[1] < 0 || s[1] > 0))
+            for (int k = 0; k < LANES; k++)
+                image[i + (size_t)k] = quotient(s + 2 * k, fill);
+        else
+            for (int k = 0; k < LANES; k++)
+                image[i + (size_t)k] = (float)(s[2 * k] * inverse);
     }
-    for (; i < n; i++) {
-        const double w = sum[2 * i + 1];
-        image[i] = w < 0 || w > 0 ? (float)(sum[2 * i] * (1 / w)) : fill;
-    }
+    for (; i < n; i++)
+        image[i] = quotient(sum + 2 * i, fill);
 }
 
 /* The weights. */
