@@ -11,6 +11,7 @@
 
 struct params {
     const char *stars, *columns;
+    double locus[2];
     int which, mark;
     struct opt_strs where;
 };
@@ -43,11 +44,12 @@ static void find_dstar(struct cuts *c, struct starmom *stars, const struct param
     double ours = key_or_nan(cat, "PIXSCALE"), theirs = key_or_nan(&t, "PIXSCALE");
     if (fabs(theirs / ours - 1) > 1e-6)
         die(EXIT_RUN, "%s: stars for pixels of %g arcsec, but the catalogue has %g", p->stars, theirs, ours);
-    if (p->which == DSTAR_EACH) {
+    if (p->which == DSTAR_EACH || c->locus_width > 0) {
         if (starmom_from_table(stars, &t, &e))
             die(EXIT_RUN, "%s: %s", p->stars, e.text);
         c->stars = stars;
-    } else {
+    }
+    if (p->which != DSTAR_EACH) {
         c->dstar = key_or_nan(&t, key);
         if (!(c->dstar > 0))
             die(EXIT_RUN, "%s: no keyword %s: make the file with rrgshape --stars-only", p->stars, key);
@@ -144,6 +146,7 @@ int main(int argc, char **argv)
         {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file with DSTAR (default: keywords of the catalogue)", NULL, 1},
         {"dstar", 0, OPT_CHOICE, &p.which, 0, 0, "HOW", "size of a star: smallest width, its own width, each object's width", "min|own|each", 0},
         {"star-prob", 0, OPT_REAL, &cuts.star_prob, 0, 1, "P", "an object with STAR_PROB above is a star (1: no cut)", NULL, 0},
+        {"star-locus", 0, OPT_PAIR, p.locus, 0, 60, "MAG,F", "one brighter than MAG with the size of a star to the fraction F is a star too", NULL, 0},
         {"max-ellipticity", 'e', OPT_REAL, &cuts.max_e, 0, 1e9, "E", "keep |e| < E", NULL, 0},
         {"size-factor", 0, OPT_REAL, &cuts.factor, 0, 1e3, "F", "keep d >= F sqrt(d*^2 + FLOOR)", NULL, 0},
         {"size-floor", 0, OPT_REAL, &cuts.floor, 0, 1e6, "PX2", "the floor in the size cut, pixel^2", NULL, 0},
@@ -162,6 +165,8 @@ int main(int argc, char **argv)
     struct cut_where *where = parse_where(&p.where);
     if (table_read(&t, c.argv[0], c.max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
+    cuts.locus_mag = p.locus[0];
+    cuts.locus_width = p.locus[1];
     find_dstar(&cuts, &stars, &p, &t, c.max_memory);
     int64_t *bits = calloc(t.nrow + 1, sizeof *bits);
     if (!bits)

@@ -386,7 +386,7 @@ int main(int argc, char **argv)
         {"weight", 0, OPT_STR, &p.weight, 0, 0, "FILE", "weight map: 1/variance when WHTTYPE is IVM, else relative", NULL, 1},
         {"segmentation", 0, OPT_STR, &p.segmentation, 0, 0, "FILE", "labels of pixels: neighbours are masked", NULL, 1},
         {"star-average", 0, OPT_CHOICE, &p.average, 0, 0, "HOW", "average over stars", "mean|median", 0},
-        {"max-stars", 0, OPT_LONG, &p.max_stars, 0, 1e9, "N", "use the first N good stars (0: all)", NULL, 0},
+        {"max-stars", 0, OPT_LONG, &p.max_stars, 0, 1e9, "N", "use N of the good stars, spread over the catalogue (0: all)", NULL, 0},
         {"pixscale", 'x', OPT_REAL, &p.scale, 0, 1e4, "ARCSEC", "pixel scale over the header's, arcsec (0: header)", NULL, 0},
         {"pixel", 0, OPT_REAL, &p.pixel, 0, 1e4, "ARCSEC", "with --psf: side of the pixel that collected the light (0: header)", NULL, 0},
         {0}};

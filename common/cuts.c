@@ -77,7 +77,7 @@ static int need(const struct table *t, const char *name, const char *why, const 
 }
 
 struct used {
-    const struct column *prob, *e1, *e2, *d, *dpsf, *width, *flags, *flux, *err;
+    const struct column *prob, *mag, *e1, *e2, *d, *dpsf, *width, *flags, *flux, *err;
 };
 
 static int find_columns(const struct table *t, const struct cuts *c, struct used *u, struct err *e)
@@ -89,7 +89,10 @@ static int find_columns(const struct table *t, const struct cuts *c, struct used
         st = need(t, "E2", shape, &u->e2, e);
     if (st == OK)
         st = need(t, "D_RRG", shape, &u->d, e);
-    if (st == OK && c->which == DSTAR_EACH)
+    const int own = c->which == DSTAR_EACH || c->locus_width > 0;
+    if (st == OK && c->locus_width > 0)
+        st = need(t, "MAG_AUTO", ": needed for the locus of the stars", &u->mag, e);
+    if (st == OK && own)
         st = c->stars ? need(t, "WIDTH", shape, &u->width, e) : need(t, "D_PSF", shape, &u->dpsf, e);
     if (st == OK && c->snr > 0)
         st = need(t, "FLUX_AUTO", flux, &u->flux, e);
@@ -98,15 +101,28 @@ static int find_columns(const struct table *t, const struct cuts *c, struct used
     return st;
 }
 
-static double star_size(const struct cuts *c, const struct used *u, size_t row)
+/* Size of a star under the weight of this object. */
+static double own_size(const struct cuts *c, const struct used *u, size_t row)
 {
     struct rrg_psf p;
-    if (c->which != DSTAR_EACH)
-        return c->dstar;
     if (!c->stars)
         return table_number(u->dpsf, row);
     starmom_at(c->stars, table_number(u->width, row), &p);
     return sqrt(0.5 * (p.m2[0] + p.m2[2]));
+}
+
+static double star_size(const struct cuts *c, const struct used *u, size_t row)
+{
+    return c->which == DSTAR_EACH ? own_size(c, u, row) : c->dstar;
+}
+
+/* By its class, or by its place in the plane of size and magnitude. */
+static int is_star(const struct cuts *c, const struct used *u, size_t i, double d)
+{
+    if (u->prob && table_number(u->prob, i) > c->star_prob)
+        return 1;
+    return c->locus_width > 0 && table_number(u->mag, i) < c->locus_mag &&
+           fabs(d / own_size(c, u, i) - 1) < c->locus_width;
 }
 
 static int64_t row_bits(const struct cuts *c, const struct used *u, size_t i)
@@ -114,7 +130,7 @@ static int64_t row_bits(const struct cuts *c, const struct used *u, size_t i)
     int64_t bits = 0;
     double d = table_number(u->d, i), e = hypot(table_number(u->e1, i), table_number(u->e2, i));
     long flags = u->flags ? (long)table_number(u->flags, i) : 0;
-    if (u->prob && table_number(u->prob, i) > c->star_prob)
+    if (is_star(c, u, i, d))
         bits |= CUT_STAR;
     if (!(e < c->max_e))
         bits |= CUT_ELLIPTICITY;

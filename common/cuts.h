@@ -25,6 +25,8 @@ enum dstar { DSTAR_MIN, DSTAR_OWN, DSTAR_EACH };
 
 struct cuts {
     double star_prob;         /* an object with STAR_PROB above is a star */
+    double locus_mag;         /* and one with MAG_AUTO below this whose size is that of a star under its own weight */
+    double locus_width;       /* to this fraction; 0: no such test */
     double max_e;             /* |e| < max_e */
     double factor, floor;     /* d > factor sqrt(d*^2 + floor), pixels */
     double snr;               /* FLUX_AUTO/FLUXERR_AUTO >= snr */

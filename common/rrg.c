@@ -168,6 +168,36 @@ void rrg_correct(const struct moments *m, const struct rrg_psf *psf, const struc
     *out = r;
 }
 
+#define DIFFERENCE 1e-2        /* steps of the derivatives, in errors of the PSF's moments */
+
+void rrg_psf_error(const struct moments *m, const struct rrg_psf *psf, const struct rrg_options *opt,
+                   const double cov[8][8], const struct rrg *r, double err[2])
+{
+    double by[2][8], var[2] = {0};
+    for (int q = 0; q < 8; q++) {
+        const double h = DIFFERENCE * sqrt(cov[q][q]);
+        struct rrg up, down;
+        struct rrg_psf p = *psf;
+        double *v = q < 3 ? &p.m2[q] : &p.m4[q - 3];
+        by[0][q] = by[1][q] = 0;
+        if (h == 0)
+            continue;
+        const double at = *v;
+        *v = at + h;
+        rrg_correct(m, &p, opt, &up);
+        *v = at - h;
+        rrg_correct(m, &p, opt, &down);
+        for (int c = 0; c < 2; c++)
+            by[c][q] = (up.e[c] - down.e[c]) / (2 * h);
+    }
+    for (int c = 0; c < 2; c++) {
+        for (int q = 0; q < 8; q++)
+            for (int k = 0; k < 8; k++)
+                var[c] += by[c][q] * by[c][k] * cov[q][k];
+        err[c] = isnan(r->e[c]) ? NAN : spread(var[c]);
+    }
+}
+
 double rrg_response(const struct rrg *r)
 {
     return 0.5 * (r->p11 + r->p22);

@@ -59,6 +59,14 @@ void rrg_correct(const struct moments *m, const struct rrg_psf *psf, const struc
                  struct rrg *out);
 
 /*
+ * Errors of e of an object because the moments of the PSF have errors: cov of m2[0..2],
+ * m4[0..4] of psf.  e is linear in so small changes; derivatives by differences.
+ * r is what rrg_correct() gave.  NaN where e is.
+ */
+void rrg_psf_error(const struct moments *m, const struct rrg_psf *psf, const struct rrg_options *opt,
+                   const double cov[8][8], const struct rrg *r, double err[2]);
+
+/*
  * G of one object, (p11 + p22)/2: equal to 2 - e^2 - lambda/2 - e.mu/2 without
  * the centroid term.  The shear estimator divides by its mean over many
  * objects, never object by object.

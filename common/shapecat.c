@@ -55,8 +55,10 @@ static const struct field fields[] = {
     {"D_PSF", "pixel", "rms size of a star under the same weight"},
     {"E1", "", "ellipticity along x"},
     {"E2", "", "ellipticity along the diagonal"},
-    {"E1ERR", "", "error of E1"},
-    {"E2ERR", "", "error of E2"},
+    {"E1ERR", "", "error of E1, by noise and stars"},
+    {"E2ERR", "", "error of E2, by noise and stars"},
+    {"E1ERR_STARS", "", "error of E1 by the stars alone, common to all objects"},
+    {"E2ERR_STARS", "", "error of E2 by the stars alone, common to all objects"},
     {"LAMBDA", "", "trace term of the response"},
     {"MU1", "", "term of the response along x"},
     {"MU2", "", "term of the response along the diagonal"},
@@ -78,7 +80,8 @@ static double *put(double *to, const double *from, int n)
     return to;
 }
 
-static void fill_row(const struct moments *m, const struct rrg *r, double dpsf, double v[FIELDS])
+/* stars: errors of e by the stars. */
+static void fill_row(const struct moments *m, const struct rrg *r, double dpsf, const double stars[2], double v[FIELDS])
 {
     const double *c = m->cov, *k = r->cov;
     double *p = put(v, (double[]){m->w, m->x + 1, m->y + 1, m->s, root(m->s_var)}, 5);
@@ -93,7 +96,8 @@ static void fill_row(const struct moments *m, const struct rrg *r, double dpsf, 
     p = put(p, r->m4, 5);
     p = put(p, (double[]){r->d, r->d_err, dpsf}, 3);
     p = put(p, r->e, 2);
-    p = put(p, r->e_err, 2);
+    p = put(p, (double[]){hypot(r->e_err[0], stars[0]), hypot(r->e_err[1], stars[1])}, 2);
+    p = put(p, stars, 2);
     p = put(p, (double[]){r->lambda, r->mu[0], r->mu[1], r->p11, r->p22, m->masked}, 6);
 }
 
@@ -165,6 +169,7 @@ struct job {
     const struct starmom *psf;
     const struct shapecat_options *opt;
     struct rrg_psf first;
+    double first_cov[STARMOM_N][STARMOM_N];
     struct moments_scratch *scratch;
     double *out[FIELDS];
     int64_t *flags;
@@ -183,6 +188,21 @@ static struct moments unmeasured(const struct moments_object *o)
     return m;
 }
 
+/* PSF correction, and the errors of e that the stars leave. */
+static void correct(const struct job *job, const struct moments *m, const struct rrg_psf *own, struct rrg *r, double stars[2])
+{
+    const int first = job->opt->rrg.first && job->psf;
+    const struct rrg_psf *psf = first ? &job->first : own;
+    double here[STARMOM_N][STARMOM_N];
+    rrg_correct(m, psf, &job->opt->rrg, r);
+    stars[0] = stars[1] = isnan(r->e[0]) ? NAN : 0;
+    if (!job->psf || !(job->psf->err[0][0] > 0))
+        return;
+    if (!first)
+        starmom_cov(job->psf, m->w, here);
+    rrg_psf_error(m, psf, &job->opt->rrg, first ? job->first_cov : here, r, stars);
+}
+
 static int measure_rows(void *ctx, long begin, long end, int worker)
 {
     struct job *job = ctx;
@@ -199,9 +219,9 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
             return st;
         if (job->psf)
             starmom_at(job->psf, o->w, &psf);
-        double dpsf = sqrt(0.5 * (psf.m2[0] + psf.m2[2]));
-        rrg_correct(&m, job->opt->rrg.first && job->psf ? &job->first : &psf, &job->opt->rrg, &r);
-        fill_row(&m, &r, dpsf, v);
+        double dpsf = sqrt(0.5 * (psf.m2[0] + psf.m2[2])), stars[2];
+        correct(job, &m, &psf, &r, stars);
+        fill_row(&m, &r, dpsf, stars, v);
         for (int k = 0; k < FIELDS; k++)
             job->out[k][i] = v[k];
         job->flags[i] = r.flags;
@@ -235,8 +255,10 @@ int shapecat_measure(struct table *t, const struct moments_map *map, const struc
     for (int k = 0; k < FIELDS; k++)
         job.out[k] = table_reals(t, fields[k].name);
     job.flags = table_ints(t, "FLAGS_RRG");
-    if (opt->rrg.first && psf)
+    if (opt->rrg.first && psf) {
         starmom_at(psf, opt->first_width, &job.first);
+        starmom_cov(psf, opt->first_width, job.first_cov);
+    }
     job.scratch = calloc((size_t)opt->threads, sizeof *job.scratch);
     if (!job.scratch)
         return E_NOMEM;
@@ -250,8 +272,20 @@ int shapecat_measure(struct table *t, const struct moments_map *map, const struc
     return st;
 }
 
-int starmom_to_table(const struct starmom *s, struct table *t)
+/* Column names: PXXERR, and PXX_PXY for the covariance of two moments. */
+static void error_name(char to[16], int q)
 {
+    snprintf(to, 16, "%sERR", starmom_name[q]);
+}
+
+static void cov_name(char to[16], int q, int r)
+{
+    snprintf(to, 16, "%s_%s", starmom_name[q], starmom_name[r]);
+}
+
+static int add_star_columns(struct table *t)
+{
+    static const char *const unit[] = {"pixel2", "pixel4", "pixel4", "pixel6", "pixel8"};
     char name[16];
     int st = table_add(t, "WIDTH", COL_REAL, "pixel", "rms width of the weight");
     if (st == OK)
@@ -259,9 +293,21 @@ int starmom_to_table(const struct starmom *s, struct table *t)
     for (int q = 0; q < STARMOM_N && st == OK; q++)
         st = table_add(t, starmom_name[q], COL_REAL, q < 3 ? "pixel2" : "pixel4", "mean normalised moment");
     for (int q = 0; q < STARMOM_N && st == OK; q++) {
-        snprintf(name, sizeof name, "%sERR", starmom_name[q]);
+        error_name(name, q);
         st = table_add(t, name, COL_REAL, q < 3 ? "pixel2" : "pixel4", "standard error of the mean");
     }
+    for (int q = 0; q < STARMOM_N && st == OK; q++)
+        for (int r = q + 1; r < STARMOM_N && st == OK; r++) {
+            cov_name(name, q, r);
+            st = table_add(t, name, COL_REAL, unit[2 + (q >= 3) + (r >= 3)], "covariance of two means");
+        }
+    return st;
+}
+
+int starmom_to_table(const struct starmom *s, struct table *t)
+{
+    char name[16];
+    int st = add_star_columns(t);
     if (st == OK)
         st = table_resize(t, (size_t)s->n);
     if (st)
@@ -269,10 +315,14 @@ int starmom_to_table(const struct starmom *s, struct table *t)
     for (int i = 0; i < s->n; i++) {
         table_reals(t, "WIDTH")[i] = s->w[i];
         table_ints(t, "NSTARS")[i] = s->stars[i];
-        for (int q = 0; q < STARMOM_N; q++) {
-            snprintf(name, sizeof name, "%sERR", starmom_name[q]);
+        for (int q = 0, pair = 0; q < STARMOM_N; q++) {
+            error_name(name, q);
             table_reals(t, starmom_name[q])[i] = s->m[q][i];
             table_reals(t, name)[i] = s->err[q][i];
+            for (int r = q + 1; r < STARMOM_N; r++, pair++) {
+                cov_name(name, q, r);
+                table_reals(t, name)[i] = s->cov[pair][i];
+            }
         }
     }
     st = table_set_number(t, "DSTAR", s->dstar);
@@ -281,6 +331,24 @@ int starmom_to_table(const struct starmom *s, struct table *t)
     if (st == OK && isfinite(s->dstar_err))
         st = table_set_number(t, "DSTARERR", s->dstar_err);
     return st;
+}
+
+/* Errors and covariances, where the file has them; a file without is of a PSF that is known. */
+static void star_errors(struct starmom *s, const struct table *t)
+{
+    char name[16];
+    for (int q = 0, pair = 0; q < STARMOM_N; q++) {
+        error_name(name, q);
+        const double *v = table_reals(t, name);
+        if (v)
+            memcpy(s->err[q], v, t->nrow * sizeof *v);
+        for (int r = q + 1; r < STARMOM_N; r++, pair++) {
+            cov_name(name, q, r);
+            v = table_reals(t, name);
+            if (v)
+                memcpy(s->cov[pair], v, t->nrow * sizeof *v);
+        }
+    }
 }
 
 int starmom_from_table(struct starmom *s, const struct table *t, struct err *e)
@@ -298,6 +366,7 @@ int starmom_from_table(struct starmom *s, const struct table *t, struct err *e)
         memcpy(r.m[q], m, t->nrow * sizeof *m);
     }
     memcpy(r.w, w, t->nrow * sizeof *w);
+    star_errors(&r, t);
     double v;
     if (table_key_number(t, "DSTAR", &v) == OK)
         r.dstar = v;

@@ -51,8 +51,8 @@ MUST_CHECK int shapecat_measure(struct table *t, const struct moments_map *map, 
                                 struct progress *bar, long *bad);
 
 /*
- * Star moments as a table: WIDTH [pixel] NSTARS PXX .. PYYYY and errors, one row
- * per width; keywords DSTAR, DSTARERR, DSTARW [pixel].
+ * Star moments as a table: WIDTH [pixel] NSTARS PXX .. PYYYY, errors and covariances
+ * (PXX_PXY ..), one row per width; keywords DSTAR, DSTARERR, DSTARW [pixel].
  */
 MUST_CHECK int starmom_to_table(const struct starmom *s, struct table *t);
 MUST_CHECK int starmom_from_table(struct starmom *s, const struct table *t, struct err *e);

@@ -57,7 +57,20 @@ static int measure_stars(void *ctx, long begin, long end, int worker)
     return OK;
 }
 
-/* keep[i]: the star is like the others. Sets dstar. */
+/* Of `kept` stars keep `most`, evenly spread over the list. */
+static void thin(size_t n, unsigned char *keep, size_t kept, size_t most)
+{
+    size_t seen = 0, taken = 0;
+    for (size_t i = 0; i < n; i++)
+        if (keep[i]) {
+            /* star number `seen` is the middle of one of `most` equal parts */
+            const size_t middle = (size_t)(((double)taken + 0.5) * (double)kept / (double)most);
+            keep[i] = taken < most && seen++ == middle;
+            taken += keep[i];
+        }
+}
+
+/* keep[i]: the star is like the others, or one of max_stars of them. Sets dstar. */
 static int choose(struct starmom *s, const double *d, size_t n, long max_stars, unsigned char *keep)
 {
     double *v = malloc((n + 1) * sizeof *v);
@@ -66,14 +79,17 @@ static int choose(struct starmom *s, const double *d, size_t n, long max_stars, 
     memset(keep, 1, n);
     size_t kept = 0;
     double width = INFINITY, mid = 0;
-    for (int round = 0; round < 3; round++) {
+    for (int round = 0; round < 4; round++) {
+        if (round == 3) {
+            if (max_stars <= 0 || kept <= (size_t)max_stars)
+                break;
+            thin(n, keep, kept, (size_t)max_stars);
+        }
         kept = 0;
         for (size_t i = 0; i < n; i++) {
-            keep[i] = isfinite(d[i]) && fabs(d[i] - mid) <= width;
-            if (keep[i] && !(round == 2 && max_stars > 0 && kept >= (size_t)max_stars))
+            keep[i] = (round < 3 || keep[i]) && isfinite(d[i]) && fabs(d[i] - mid) <= width;
+            if (keep[i])
                 v[kept++] = d[i];
-            else
-                keep[i] = 0;
         }
         if (kept == 0)
             break;
@@ -89,27 +105,50 @@ static int choose(struct starmom *s, const double *d, size_t n, long max_stars, 
     return kept > 1 ? OK : E_MISSING;
 }
 
+/*
+ * Means at width k and their covariance.  Leaving out one star after the other
+ * gives sum (x - mean)(y - mean) / (n (n - 1)): the jackknife of a mean.
+ * v has room for STARMOM_N * n.
+ */
+static int average_width(struct starmom *s, int k, const double *value, size_t n, const unsigned char *keep, int use_median, double *v)
+{
+    const double factor = use_median ? M_PI / 2 : 1;
+    size_t m = 0;
+    for (size_t i = 0; i < n; i++)
+        if (keep[i] && isfinite(value[i])) {            /* all moments of a star are, or none */
+            for (size_t q = 0; q < STARMOM_N; q++)
+                v[q * n + m] = value[q * n + i];
+            m++;
+        }
+    s->stars[k] = (long)m;
+    if (m < 2)
+        return E_MISSING;
+    double mean[STARMOM_N];
+    for (size_t q = 0; q < STARMOM_N; q++) {
+        struct stats sum;
+        stats_sum(m, v + q * n, &sum);
+        mean[q] = sum.mean;
+        s->err[q][k] = sqrt(factor * sum.var / (double)m);
+    }
+    size_t pair = 0;
+    for (size_t q = 0; q < STARMOM_N; q++)
+        for (size_t r = q + 1; r < STARMOM_N; r++) {
+            struct sum c = {0};
+            for (size_t i = 0; i < m; i++)
+                sum_add(&c, (v[q * n + i] - mean[q]) * (v[r * n + i] - mean[r]));
+            s->cov[pair++][k] = factor * sum_value(&c) / ((double)m * (double)(m - 1));
+        }
+    for (size_t q = 0; q < STARMOM_N; q++)
+        s->m[q][k] = use_median ? stats_median(m, v + q * n) : mean[q];
+    return OK;
+}
+
 static int average(struct starmom *s, const double *value, size_t n, const unsigned char *keep, int use_median)
 {
-    double *v = malloc((n + 1) * sizeof *v);
-    if (!v)
-        return E_NOMEM;
-    int st = OK;
+    double *v = malloc((STARMOM_N * n + 1) * sizeof *v);
+    int st = v ? OK : E_NOMEM;
     for (int k = 0; k < s->n && st == OK; k++)
-        for (int q = 0; q < STARMOM_N; q++) {
-            const double *from = value + ((size_t)k * STARMOM_N + (size_t)q) * n;
-            size_t m = 0;
-            for (size_t i = 0; i < n; i++)
-                if (keep[i] && isfinite(from[i]))
-                    v[m++] = from[i];
-            struct stats sum;
-            stats_sum(m, v, &sum);
-            s->stars[k] = (long)m;
-            s->m[q][k] = use_median ? stats_median(m, v) : sum.mean;
-            s->err[q][k] = sqrt(sum.var / (double)m);
-            if (m < 2)
-                st = E_MISSING;
-        }
+        st = average_width(s, k, value + (size_t)k * STARMOM_N * n, n, keep, use_median, v);
     free(v);
     return st;
 }
@@ -190,13 +229,36 @@ int starmom_prepare(struct starmom *s)
     return OK;
 }
 
-void starmom_at(const struct starmom *s, double w, struct rrg_psf *out)
+/* The width within the table; rows i, i + 1 on both sides, b of the way in log w from one to the other, h between them. */
+static double locate(const struct starmom *s, double w, int *at, double *b, double *h)
 {
     double u = fmin(fmax(w, s->w[0]), s->w[s->n - 1]);
     int i = 0;
     while (i < s->n - 2 && u > s->w[i + 1])
         i++;
-    double x0 = log(s->w[i]), h = log(s->w[i + 1]) - x0, b = (log(u) - x0) / h, a = 1 - b;
+    double x0 = log(s->w[i]);
+    *at = i;
+    *h = log(s->w[i + 1]) - x0;
+    *b = (log(u) - x0) / *h;
+    return u;
+}
+
+void starmom_cov(const struct starmom *s, double w, double cov[STARMOM_N][STARMOM_N])
+{
+    int i, pair = 0;
+    double b, h;
+    locate(s, w, &i, &b, &h);
+    for (int q = 0; q < STARMOM_N; q++) {
+        cov[q][q] = (1 - b) * s->err[q][i] * s->err[q][i] + b * s->err[q][i + 1] * s->err[q][i + 1];
+        for (int r = q + 1; r < STARMOM_N; r++, pair++)
+            cov[q][r] = cov[r][q] = (1 - b) * s->cov[pair][i] + b * s->cov[pair][i + 1];
+    }
+}
+
+void starmom_at(const struct starmom *s, double w, struct rrg_psf *out)
+{
+    int i;
+    double b, h, u = locate(s, w, &i, &b, &h), a = 1 - b;
     double ca = (a * a * a - a) * h * h / 6, cb = (b * b * b - b) * h * h / 6;
     out->w = u;
     for (int q = 0; q < STARMOM_N; q++) {

@@ -32,6 +32,15 @@ cutcat in.cat --dstar own -o own.cat; near "d* with own widths: limit 1.317" "$(
 cutcat in.cat --dstar each -o each.cat; near "d* at each object's width: limit 1.132" "$(col each.cat NUMBER | tr -d '\n')" 1 0
 cutcat in.cat --where 'MAG_AUTO<25.2' --where 'NUMBER != 1' -o w.cat; near "--where twice" "$(col w.cat NUMBER | tr -d '\n')" 6 0
 cutcat in.cat --snr 0 --star-prob 1 --max-ellipticity 2 --flags 0 -o loose.cat; near "loose cuts leave those with a size and an ellipticity" "$(col loose.cat NUMBER | tr -d '\n')" 123689 0
+{ cat in.cat; echo "10 0 0 0.71 0.7 100 5 0.1 0 20"; echo "11 0 0 0.71 0.7 100 5 0.1 0 26"; echo "12 0 0 0.80 0.7 100 5 0.1 0 20"; echo "13 0 0 nan 0.7 100 5 0.1 1 20"; } >loc.cat
+cutcat loc.cat --star-locus 23,0.05 --mark -o loc.out
+near "--star-locus: bright and of a star's size, nothing else" "$(col loc.out CUT | awk '$1 % 2 { printf "%d ", NR }' | tr -d ' ')" 210 0
+near "counted with the stars" "$(key loc.out NSTARCUT)" 11 0
+cutcat loc.cat --star-locus 23,0.15 --star-prob 1 --mark -o loc.out
+near "a wider locus; stars by it alone" "$(col loc.out CUT | awk '$1 % 2 { printf "%d ", NR }' | tr -d ' ')" 1012 0
+fails "--star-locus: two numbers" 2 cutcat loc.cat --star-locus 23
+sed 's/MAG_AUTO/MAG/' loc.cat >nomag.cat; fails "--star-locus without magnitudes" 1 cutcat nomag.cat --star-locus 23,0.05
+sed 's/ D_PSF / D_OLD /' loc.cat >nopsf.cat; fails "--star-locus without the size of a star" 1 cutcat nopsf.cat --star-locus 23,0.05
 cutcat in.cat -s 5 >pipe.cat; cutcat - <in.cat >pipe2.cat; near "pipe: the same rows" "$(diff <(grep -v '^#' pipe.cat) <(grep -v '^#' pipe2.cat) | wc -l)" 0 0
 cutcat in.cat -j 2 -o j2.cat; same "threads" use.cat j2.cat
 ok "nothing survives" cutcat in.cat --snr 1e6 -o none.cat

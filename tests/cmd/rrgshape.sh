@@ -140,6 +140,24 @@ if [ -x "$BIN/psfgen" ]; then
     rrgshape dr.fits im.cat --psf psf.fits -o dr.out; rrgshape im.fits im.cat --psf psf.fits --pixel 0.2 -o px.out
     near "drizzled image: pixel of the CCD" "$(key dr.out DSTAR)" "$(key px.out DSTAR)" 1e-12
     between "d* with a pixel of 0.2 arcsec" "$(key dr.out DSTAR)" 0.65 0.80
+    near "a known PSF adds no error" "$(col psf.out E1ERR_STARS | head -1)" 0 0
+
+    # errors by the stars: one galaxy corrected with the stars of 12 fields of 36 stars; its e scatters as E1ERR_STARS says
+    for s in 1 2 3 4 5 6 7 8 9 10 11 12; do
+        galgen --field 16 --stars -n 36 -s $s | simage - -p psf.fits -x 0.1 --size 160,160 | addnoise --depth 27.7 -s $s -o st.fits
+        detect -q st.fits -o st.cat; rrgshape -q --stars-only st.fits st.cat -o st.rrg && rrgshape -q im.fits im.cat --stars st.rrg -o st$s.out
+    done
+    scatter() { for s in 1 2 3 4 5 6 7 8 9 10 11 12; do echo "$(col st$s.out $1 | sed -n 2p) $(col st$s.out $1ERR_STARS | sed -n 2p)"; done |
+        awk '{ a += $1; b += $1 * $1; v += $2 * $2 } END { print sqrt((b - a * a / NR) / (NR - 1) / (v / NR)) }'; }
+    # a spread by 12 values is known to 21 %; three of them
+    near "E1ERR_STARS against the scatter of E1 over 12 star fields" "$(scatter E1)" 1 0.63
+    near "E2ERR_STARS against the scatter of E2" "$(scatter E2)" 1 0.63
+    near "noise and stars add to E1ERR" "$(paste <(col st1.out E1ERR) <(col st1.out E1ERR_STARS) <(col psf.out E1ERR) | awk 'NR == 2 { print $1 / sqrt($2 * $2 + $3 * $3) }')" 1 0.02
+    galgen --field 36 --stars -n 100 | simage - -p psf.fits -x 0.1 --size 360,360 | addnoise --depth 27.7 -o st.fits
+    detect -q st.fits -o st.cat; rrgshape -q --stars-only st.fits st.cat -o st.rrg; rrgshape -q im.fits im.cat --stars st.rrg -o st.out
+    rrgshape -q --stars-only --max-stars 25 st.fits st.cat -o few.rrg; rrgshape -q im.fits im.cat --stars few.rrg -o few.out
+    near "--max-stars 25: so many at the smallest width" "$(col few.rrg NSTARS | head -1)" 25 0
+    between "25 stars for 100: twice the error (a spread by 25 is known to 14 %: 3 sigma)" "$(paste <(col few.out E1ERR_STARS) <(col st.out E1ERR_STARS) | awk 'NR == 2 { print $1 / $2 }')" 1.2 2.8
 else
     skip "psfgen is not built: --psf FILE"
 fi

@@ -103,9 +103,100 @@ static void field(void)
     check_that(starmom_measure(&two, &map, 0, o, &opt, 0, 0, 1) == E_MISSING, "no star");
 }
 
+/* A field of 36 noisy, slightly elliptical stars and one galaxy at (70, 70). */
+enum { SIDE = 400, NSTARS = 36 };
+static void noisy_field(double *pix, struct moments_object *o)
+{
+    struct rng r = rng_stream(42, 0, RNG_TEST);
+    for (size_t i = 0; i < (size_t)SIDE * SIDE; i++)
+        pix[i] = 0.5 * rng_normal(&r, i, 5);
+    for (int k = 0; k < NSTARS; k++) {
+        double x = 40 + 62 * (k % 6) + rng_uniform(&r, (uint64_t)k, 0), y = 40 + 62 * (k / 6) + rng_uniform(&r, (uint64_t)k, 1);
+        for (int j = -25; j <= 25; j++)
+            for (int i = -25; i <= 25; i++) {
+                double u = (int)x + i - x, v = (int)y + j - y;
+                pix[((int)y + j) * SIDE + (int)x + i] += 1000 * exp(-(u * u / 0.9 + v * v / 0.75) / 2);
+            }
+        o[k] = (struct moments_object){.x = x, .y = y, .w = 1};
+    }
+    for (int j = -25; j <= 25; j++)
+        for (int i = -25; i <= 25; i++)
+            pix[(70 + j) * SIDE + 70 + i] += 300 * exp(-(i * i / 4.0 + i * j * 0.05 + j * j / 3.0) / 2);
+}
+
+/* The error of e by the stars: the formula against leaving out one star after the other, all the way to e. */
+static void jackknife(void)
+{
+    static double pix[SIDE * SIDE];
+    struct moments_object o[NSTARS], rest[NSTARS], galaxy = {.x = 70, .y = 70};
+    struct moments_options opt = MOMENTS_DEFAULTS;
+    struct moments_map map = {.nx = SIDE, .ny = SIDE, .pix64 = pix};
+    struct moments_scratch sc = {0};
+    struct moments m;
+    struct starmom all = {.dstar_w = 1};
+    noisy_field(pix, o);
+    int st = starmom_widths(&all, 24, 0.8, 5);
+    struct starmom less = all;
+    if (st == OK)
+        st = starmom_measure(&all, &map, NSTARS, o, &opt, 0, 0, 1);
+    galaxy.w = all.w[14];
+    if (st == OK)
+        st = moments_measure(&map, &galaxy, &opt, &sc, &m);
+    if (!check_that(st == OK && all.stars[0] == NSTARS, "36 noisy stars and a galaxy are measured"))
+        return;
+    static const struct rrg_options ways[] = {{0}, {.plain = 1}, {.first = 1}};
+    struct check c = check_begin("error of e by the stars = jackknife over 36 of them (linear to 1 %), three ways of correction");
+    for (int k = 0; k < 3; k++) {
+        struct rrg_psf p;
+        struct rrg r, full;
+        double cov[8][8], err[2], sum[2] = {0}, sum2[2] = {0};
+        starmom_at(&all, m.w, &p);
+        starmom_cov(&all, m.w, cov);
+        rrg_correct(&m, &p, &ways[k], &full);
+        rrg_psf_error(&m, &p, &ways[k], (const double (*)[8])cov, &full, err);
+        for (int out = 0; out < NSTARS; out++) {
+            memcpy(rest, o, sizeof o);
+            rest[out] = rest[NSTARS - 1];
+            check_close(&c, starmom_measure(&less, &map, NSTARS - 1, rest, &opt, 0, 0, 1), OK, 0.1);
+            starmom_at(&less, m.w, &p);
+            rrg_correct(&m, &p, &ways[k], &r);
+            for (int i = 0; i < 2; i++) {
+                sum[i] += (r.e[i] - full.e[i]) / NSTARS;
+                sum2[i] += pow(r.e[i] - full.e[i], 2) / NSTARS;
+            }
+        }
+        for (int i = 0; i < 2; i++)
+            check_close(&c, err[i] / sqrt((NSTARS - 1) * (sum2[i] - sum[i] * sum[i])), 1, 0.01);
+    }
+    check_end(&c);
+    struct starmom median = {.dstar_w = 1};
+    double a[8][8], b[8][8];
+    check_that(starmom_widths(&median, 24, 0.8, 5) == OK && starmom_measure(&median, &map, NSTARS, o, &opt, 0, 1, 1) == OK, "the median of the stars");
+    starmom_cov(&all, 2, a);
+    starmom_cov(&median, 2, b);
+    c = check_begin("variance of the median: pi/2 of the mean's; between rows between theirs");
+    for (int q = 0; q < 8; q++)
+        for (int r = 0; r < 8; r++)
+            check_close(&c, b[q][r], a[q][r] * M_PI / 2, 1e-12 * fabs(a[q][r]));
+    starmom_cov(&all, sqrt(all.w[7] * all.w[8]), a);
+    check_close(&c, a[0][2], 0.5 * (all.cov[1][7] + all.cov[1][8]), 1e-12 * fabs(a[0][2]));
+    check_close(&c, a[1][0], a[0][1], 0);
+    check_end(&c);
+    struct starmom known = {.dstar_w = 1};
+    struct rrg_psf p;
+    struct rrg r;
+    double zero[8][8] = {{0}}, err[2];
+    starmom_at(&all, m.w, &p);
+    rrg_correct(&m, &p, &ways[0], &r);
+    rrg_psf_error(&m, &p, &ways[0], (const double (*)[8])zero, &r, err);
+    check_that(err[0] == 0 && err[1] == 0 && known.err[0][0] == 0, "a known PSF adds no error");
+    moments_scratch_free(&sc);
+}
+
 int main(void)
 {
     spline();
     field();
+    jackknife();
     return check_status();
 }
