@@ -28,6 +28,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #define FIELD_MARGIN 26.0      /* arcsec around the field of --method field */
 
@@ -341,10 +342,15 @@ static void draw(const struct plan *p, struct image *im, const struct common *c)
 {
     struct progress bar;
     size_t todo = p->n - p->count[PATH_NONE];
+    struct timespec begin, end;
     progress_begin(&bar, "simage", (long)todo, c->quiet);
+    timespec_get(&begin, TIME_UTC);
     int st = scene_render(p, im, c->threads, &bar);
+    timespec_get(&end, TIME_UTC);
     progress_end(&bar);
     check(st);
+    if (c->verbose)
+        fprintf(stderr, "simage: drawn in %.3f s\n", difftime(end.tv_sec, begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec));
 }
 
 /* The whole scene in one convolution; in place of a plan of stamps. */
@@ -442,7 +448,10 @@ static void run(const struct request *r, const struct common *c, const char *rec
             make_image(&im, &v);
         draw_field(&v, r, c, &emission, &im);
     }
-    otf_free(&in.otf);                 /* a plan holds its own tables: make room for the image */
+    if (plan.lean)                     /* a plan holds its own tables, or some of its stamps need the spline */
+        otf_keep_spline(&in.otf);
+    else
+        otf_free(&in.otf);
     if (!r->whole && !c->check) {
         make_image(&im, &v);
         draw(&plan, &im, c);
@@ -456,6 +465,7 @@ static void run(const struct request *r, const struct common *c, const char *rec
     plan_free(&plan);
     emission_free(&emission);
     image_free(&im);
+    otf_free(&in.otf);
     models_free(&in.models);
     table_free(&in.catalogue);
 }

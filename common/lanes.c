@@ -24,9 +24,10 @@ struct sequence {
 };
 
 struct lanes {
-    int n;
+    int n, rows;
     struct sequence column, row;
     double *c, *s;         /* exp(2 pi i k / n), k <= n/2: of the rows */
+    double *own;           /* the same when the columns' length is not n, owned */
 };
 
 /* re and im of n sequences of elements, `step` doubles from one element to the next. */
@@ -63,25 +64,51 @@ static int sequence_new(struct sequence *q, int n)
     return OK;
 }
 
-int lanes_new(struct lanes **made, int n)
+/* exp(2 pi i k / n), k <= n/2, for transforms whose columns are of another length. */
+static int own_turns(struct lanes *p, int n)
 {
-    if (n < 2 || n > RADIX_MAX || n % 2)
+    const int h = n / 2 + 1;
+    p->own = malloc(2 * (size_t)h * sizeof *p->own);
+    if (!p->own)
+        return E_NOMEM;
+    p->c = p->own;
+    p->s = p->own + h;
+    for (int k = 0; k < h; k++) {
+        p->c[k] = cos(2 * M_PI * k / n);
+        p->s[k] = sin(2 * M_PI * k / n);
+    }
+    return OK;
+}
+
+int lanes_new_rows(struct lanes **made, int n, int rows)
+{
+    if (n < 2 || n > RADIX_MAX || n % 2 || rows < 2 || rows > RADIX_MAX)
         return E_RANGE;
     struct lanes *p = calloc(1, sizeof *p);
     int st = p ? OK : E_NOMEM;
     if (st == OK)
-        st = sequence_new(&p->column, n);
+        st = sequence_new(&p->column, rows);
     if (st == OK)
         st = sequence_new(&p->row, n / 2);
+    if (st == OK && rows != n)
+        st = own_turns(p, n);
     if (st) {
         lanes_free(p);
         return st;
     }
     p->n = n;
-    p->c = p->column.c;
-    p->s = p->column.s;
+    p->rows = rows;
+    if (rows == n) {
+        p->c = p->column.c;
+        p->s = p->column.s;
+    }
     *made = p;
     return OK;
+}
+
+int lanes_new(struct lanes **made, int n)
+{
+    return lanes_new_rows(made, n, n);
 }
 
 void lanes_free(struct lanes *p)
@@ -90,12 +117,13 @@ void lanes_free(struct lanes *p)
         return;
     free(p->column.c);
     free(p->row.c);
+    free(p->own);
     free(p);
 }
 
 size_t lanes_scratch(const struct lanes *p)
 {
-    return 6 * LANES * (size_t)p->n + 16 * LANES;
+    return 6 * LANES * (size_t)(p->n > p->rows ? p->n : p->rows) + 16 * LANES;
 }
 
 /* ---- stages ---- */
@@ -313,8 +341,8 @@ WIDE static void half_length(int h, const double *c, const double *s, const doub
     }
 }
 
-/* Even and odd pixels of eight rows, h of each, to `rows` rows of out. */
-WIDE static void scatter(int h, const double *even, const double *odd, int rows, int n, double *out)
+/* Even and odd pixels of eight rows, h of each, to `rows` rows of out, `stride` apart. */
+WIDE static void scatter(int h, const double *even, const double *odd, int rows, int n, size_t stride, double *out)
 {
     for (int k = 0; k < h; k += 4) {
         v8 in[8], x[8];
@@ -325,7 +353,7 @@ WIDE static void scatter(int h, const double *even, const double *odd, int rows,
         }
         transpose(in, x);
         for (int j = 0; j < rows; j++) {
-            double *to = out + (size_t)j * (size_t)n + 2 * k;
+            double *to = out + (size_t)j * stride + 2 * k;
             if (k + 4 <= h)
                 *(v8 *)to = x[j];
             else
@@ -334,10 +362,11 @@ WIDE static void scatter(int h, const double *even, const double *odd, int rows,
     }
 }
 
-void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out)
+/* Both passes; rows of the image `stride` doubles apart. */
+static void run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out, size_t stride)
 {
     const int n = p->n, h = n / 2;
-    const size_t size = LANES * (size_t)n;
+    const size_t size = LANES * (size_t)(n > p->rows ? n : p->rows);
     m = m > h + 1 ? h + 1 : m;
     const struct signal a = {scratch, scratch + size, LANES}, b = {scratch + 2 * size, scratch + 3 * size, LANES};
     for (int k = 0; k < m; k += LANES) {
@@ -348,8 +377,8 @@ void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, dou
     const size_t xs = LANES * ((size_t)h + LANES), zs = LANES * (size_t)h;
     double *x_re = scratch + 4 * size, *x_im = x_re + xs;
     const struct signal z = {x_im + xs, x_im + xs + zs, LANES};
-    for (int y = 0; y < n; y += LANES) {
-        const int rows = n - y < LANES ? n - y : LANES;
+    for (int y = 0; y < p->rows; y += LANES) {
+        const int rows = p->rows - y < LANES ? p->rows - y : LANES;
         gather(re + (size_t)y * (size_t)ld, (size_t)ld, rows - 1, m, x_re);
         gather(im + (size_t)y * (size_t)ld, (size_t)ld, rows - 1, m, x_im);
         for (int k = m; k <= h; k++) {
@@ -358,6 +387,16 @@ void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, dou
         }
         half_length(h, p->c, p->s, x_re, x_im, z.re, z.im);
         sequence_run(&p->row, &z, &z, &a, &b);
-        scatter(h, z.re, z.im, rows, n, out + (size_t)y * (size_t)n);
+        scatter(h, z.re, z.im, rows, n, stride, out + (size_t)y * stride);
     }
+}
+
+void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out)
+{
+    run(p, m, re, im, ld, scratch, out, (size_t)p->n);
+}
+
+void lanes_run_in_place(const struct lanes *p, int m, double *plane, int half, int stride, double *scratch)
+{
+    run(p, m, plane, plane + half, stride, scratch, plane, (size_t)stride);
 }

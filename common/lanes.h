@@ -17,6 +17,9 @@ struct lanes;              /* read-only once made: serves all threads */
 
 /* n even, 2..8192; prime factors beyond 5 are right but slow. E_RANGE, E_NOMEM. */
 MUST_CHECK int lanes_new(struct lanes **p, int n);
+
+/* The same for images of `rows` rows of n pixels: v y / rows takes the place of v y / n. rows >= 2. */
+MUST_CHECK int lanes_new_rows(struct lanes **p, int n, int rows);
 void lanes_free(struct lanes *p);
 
 /* Doubles of scratch that lanes_run needs. */
@@ -25,8 +28,14 @@ size_t lanes_scratch(const struct lanes *p);
 /*
  * re, im: n rows of ld doubles, ld >= n/2 + 1 and a multiple of 8, columns 0..m-1 filled (those up
  * to the next multiple of 8 are read but their values do not matter); destroyed.  Columns from m on are
- * zero and are not read.  Imaginary parts that symmetry makes 0 are ignored.  out: n x n.
+ * zero and are not read.  Imaginary parts that symmetry makes 0 are ignored.  out: n x n (rows x n).
  */
 void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out);
+
+/*
+ * In place: row y of the frequencies has its real parts at plane + y stride and its imaginary parts `half`
+ * doubles on, half >= n/2 + 1 and a multiple of 8, stride >= 2 half; row y of the image takes their place.
+ */
+void lanes_run_in_place(const struct lanes *p, int m, double *plane, int half, int stride, double *scratch);
 
 #endif

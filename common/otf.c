@@ -25,9 +25,18 @@ void otf_free(struct otf *t)
     *t = (struct otf){0};
 }
 
+void otf_keep_spline(struct otf *t)
+{
+    if (!t->sre)
+        return;
+    free(t->re);
+    free(t->im);
+    t->re = t->im = NULL;
+}
+
 int otf_is_real(const struct otf *t)
 {
-    return t->n > 0 && !t->im;
+    return t->n > 0 && !t->im && !t->sim;
 }
 
 /* Solve for spline coefficients along columns, all columns at once: c[i*step + k], k < step. */
@@ -202,54 +211,81 @@ WIDE static void mix_rows(int n, const double *c, const struct knot *k, int lo, 
     }
 }
 
-/* Spline values of one plane; line has n + 8 values whose 4 outer ones on each side are 0. */
-static void table_plane(int n, const double *c, int nx, const struct knot *kx, int ny,
-                        const struct knot *ky, double *line, double *out)
+/* Knots of a row of frequencies, and the nodes that they touch. */
+struct otf_columns {
+    int n;
+    int lo, hi;
+    struct knot knot[];
+};
+
+int otf_columns_new(struct otf_columns **made, const struct otf *t, int nx, const double *ux)
 {
-    int lo = n, hi = 0;
-    for (int i = 0; i < nx; i++)
-        if (kx[i].first > -8) {
-            lo = kx[i].first < lo ? kx[i].first : lo;
-            hi = kx[i].first + 4 > hi ? kx[i].first + 4 : hi;
-        }
-    lo = lo < 0 ? 0 : lo;
-    hi = hi > n ? n : hi;
-    for (int j = 0; j < ny; j++) {
-        double *row = out + (size_t)j * (size_t)nx;
-        if (ky[j].first == -8 || lo >= hi) {
-            memset(row, 0, (size_t)nx * sizeof *row);
+    if (t->n < 1 || !t->sre || nx < 1)
+        return E_RANGE;
+    struct otf_columns *c = malloc(sizeof *c + (size_t)nx * sizeof *c->knot);
+    if (!c)
+        return E_NOMEM;
+    c->n = nx;
+    c->lo = t->n;
+    c->hi = 0;
+    for (int i = 0; i < nx; i++) {
+        const struct knot k = c->knot[i] = knot_at(t, ux[i]);
+        if (k.first == -8)
             continue;
-        }
-        mix_rows(n, c, &ky[j], lo, hi, line + 4);
-        for (int i = 0; i < nx; i++) {
-            const double *at = line + 4 + kx[i].first, *w = kx[i].w;
-            row[i] = kx[i].first == -8 ? 0 : w[0] * at[0] + w[1] * at[1] + w[2] * at[2] + w[3] * at[3];
-        }
+        c->lo = k.first < c->lo ? k.first : c->lo;
+        c->hi = k.first + 4 > c->hi ? k.first + 4 : c->hi;
     }
+    c->lo = c->lo < 0 ? 0 : c->lo;
+    c->hi = c->hi > t->n ? t->n : c->hi;
+    *made = c;
+    return OK;
+}
+
+void otf_columns_free(struct otf_columns *c)
+{
+    free(c);
+}
+
+/* Spline values of one row of one plane, columns 0..m-1. */
+static void plane_row(int n, const double *plane, const struct otf_columns *c, int m, const struct knot *ky, double *line,
+                      double *row)
+{
+    if (ky->first == -8 || c->lo >= c->hi) {
+        memset(row, 0, (size_t)m * sizeof *row);
+        return;
+    }
+    mix_rows(n, plane, ky, c->lo, c->hi, line + 4);
+    for (int i = 0; i < m; i++) {
+        const struct knot *k = &c->knot[i];
+        const double *at = line + 4 + k->first, *w = k->w;
+        row[i] = k->first == -8 ? 0 : w[0] * at[0] + w[1] * at[1] + w[2] * at[2] + w[3] * at[3];
+    }
+}
+
+void otf_row(const struct otf *t, const struct otf_columns *c, int m, double uy, double *line, double *re, double *im)
+{
+    const struct knot k = knot_at(t, uy);
+    m = m < c->n ? m : c->n;
+    plane_row(t->n, t->sre, c, m, &k, line, re);
+    if (t->sim)
+        plane_row(t->n, t->sim, c, m, &k, line, im);
+    else if (im)
+        memset(im, 0, (size_t)m * sizeof *im);
 }
 
 static int table_grid(const struct otf *t, int nx, const double *ux, int ny, const double *uy, double *re,
                       double *im)
 {
-    struct knot *k = malloc(((size_t)nx + (size_t)ny) * sizeof *k);
+    struct otf_columns *c = NULL;
     double *line = calloc((size_t)t->n + 8, sizeof *line);
-    if (!k || !line) {
-        free(k);
-        free(line);
-        return E_NOMEM;
+    int st = line ? otf_columns_new(&c, t, nx, ux) : E_NOMEM;
+    for (int j = 0; st == OK && j < ny; j++) {
+        const size_t at = (size_t)j * (size_t)nx;
+        otf_row(t, c, nx, uy[j], line, re + at, im ? im + at : NULL);
     }
-    for (int i = 0; i < nx; i++)
-        k[i] = knot_at(t, ux[i]);
-    for (int j = 0; j < ny; j++)
-        k[nx + j] = knot_at(t, uy[j]);
-    table_plane(t->n, t->sre, nx, k, ny, k + nx, line, re);
-    if (t->sim)
-        table_plane(t->n, t->sim, nx, k, ny, k + nx, line, im);
-    else if (im)
-        memset(im, 0, (size_t)nx * (size_t)ny * sizeof *im);
-    free(k);
+    otf_columns_free(c);
     free(line);
-    return OK;
+    return st;
 }
 
 int otf_grid(const struct otf *t, int nx, const double *ux, int ny, const double *uy, double *re, double *im)

@@ -40,6 +40,9 @@ MUST_CHECK int otf_nodes(struct otf *t, int n, double du, double ucut, double *r
 /* Prepare the spline of such a table. E_NOMEM. */
 MUST_CHECK int otf_spline(struct otf *t);
 
+/* Give back the samples once the spline is there: otf_grid and otf_row still work. */
+void otf_keep_spline(struct otf *t);
+
 /* Both, samples copied. E_RANGE, E_NOMEM. */
 MUST_CHECK int otf_tabulate(struct otf *t, int n, double du, double ucut, const double *re, const double *im);
 
@@ -58,6 +61,16 @@ int otf_is_real(const struct otf *t);
  */
 MUST_CHECK int otf_grid(const struct otf *t, int nx, const double *ux, int ny, const double *uy,
                         double *re, double *im);
+
+/*
+ * A table's rows one at a time, for those too many to be kept: the columns ux[0..nx-1], then T in the
+ * first m of them on the row uy, with the bits of otf_grid.  line: n + 8 doubles whose 4 outer ones on each
+ * side are 0.
+ */
+struct otf_columns;
+MUST_CHECK int otf_columns_new(struct otf_columns **c, const struct otf *t, int nx, const double *ux);
+void otf_columns_free(struct otf_columns *c);
+void otf_row(const struct otf *t, const struct otf_columns *c, int m, double uy, double *line, double *re, double *im);
 
 /*
  * Exact transform of a sampled PSF (n x n' samples p of scale arcsec, centre at

@@ -14,6 +14,8 @@
 
 #define SIDES 34
 
+#define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
+#define PART_PIXELS 1048576    /* larger stamps are made in parts */
 #define MAPPED_LONGEST 10.0    /* seconds for one object without a PSF; those that need more are not drawn */
 
 /* Sides of stamps: multiples of 8 or nearly, with factors 2, 3 and 5. */
@@ -77,7 +79,7 @@ struct maker {
     double group_tol;      /* electrons, for the parts of one object */
     double group_norm;     /* sum of sqrt |flux| of its parts */
     int group_left;        /* parts still to come */
-    int used[SIDES];       /* grid number of a side class + 1 */
+    int used[SIDES];       /* stamps of a side class; then its grid number + 1 */
     double top[SIDES];     /* highest frequency step that an object of the class keeps */
 };
 
@@ -278,7 +280,7 @@ static int plan_fourier(struct maker *m, const struct emitter *s, const struct l
     }
     d->kcut = (float)(ceil(lo * w->du * side_of[side] * p->view.pixel) + 1);
     d->grid = (short)side;                 /* side class; becomes the number of a grid later */
-    m->used[side] = 1;
+    m->used[side]++;
     m->top[side] = fmax(m->top[side], d->kcut);
     return 1;
 }
@@ -428,24 +430,66 @@ struct stamp_response view_response(const struct view *v)
     return r;
 }
 
+/* A side class's transfer function: a view of the PSF's with a lower cut-off, so that no frequency is tabulated that nobody keeps. */
+static struct otf class_otf(const struct maker *m, int side)
+{
+    struct otf t = *m->p->view.psf;
+    t.ucut = fmin(t.ucut, (m->top[side] + 1) / (side_of[side] * m->p->view.pixel));
+    return t;
+}
+
+/* Which classes get a table: those with most stamps, as long as the tables fit. */
+static void choose_tables(const struct maker *m, int table[SIDES])
+{
+    const struct plan *p = m->p;
+    const int complex_t = !otf_is_real(p->view.psf);
+    double left = TABLE_BYTES;
+    memset(table, 0, SIDES * sizeof *table);
+    for (;;) {
+        int best = -1;
+        for (int side = 0; side < SIDES; side++)
+            if (m->used[side] && !table[side] && (best < 0 || m->used[side] > m->used[best]))
+                best = side;
+        if (best < 0)
+            return;
+        const struct otf t = class_otf(m, best);
+        const double bytes = stamp_grid_bytes(t.ucut, p->view.pixel, side_of[best], complex_t);
+        table[best] = !t.sre || bytes <= left ? 1 : -1;
+        left -= table[best] > 0 ? bytes : 0;
+    }
+}
+
+/* Parts of a stamp of n x n: the fewest that PART_PIXELS allows. */
+static int parts_of(int n)
+{
+    int parts = 1;
+    while ((double)n * n > (double)PART_PIXELS * parts)
+        parts *= 2;
+    return parts;
+}
+
 /* Tables of the side classes in use; draw.grid becomes their numbers. */
 static int finish_grids(struct maker *m)
 {
     struct plan *p = m->p;
     const struct stamp_response r = view_response(&p->view);
+    int table[SIDES];
     p->grid = calloc(SIDES, sizeof *p->grid);
     if (!p->grid)
         return E_NOMEM;
+    choose_tables(m, table);
     for (int side = 0; side < SIDES; side++) {
         if (!m->used[side])
             continue;
-        struct otf t = *p->view.psf;   /* a view of it with a lower cut-off: no row is tabulated that nobody keeps */
-        t.ucut = fmin(t.ucut, (m->top[side] + 1) / (side_of[side] * p->view.pixel));
-        int st = stamp_grid_new(&p->grid[p->n_grid], &t, &r, p->view.pixel, side_of[side]);
+        const struct otf t = class_otf(m, side);
+        int st = stamp_grid_lean(&p->grid[p->n_grid], &t, &r, p->view.pixel, side_of[side], parts_of(side_of[side]), table[side] > 0);
         if (st)
             return st;
         p->fft_plans++;
-        p->bytes += stamp_grid_bytes(t.ucut, p->view.pixel, side_of[side], !otf_is_real(p->view.psf));
+        if (table[side] > 0)
+            p->bytes += stamp_grid_bytes(t.ucut, p->view.pixel, side_of[side], !otf_is_real(p->view.psf));
+        else
+            p->lean = 1;
         m->used[side] = ++p->n_grid;
     }
     for (size_t i = 0; i < p->n; i++)

@@ -91,6 +91,7 @@ struct plan {
     struct draw *draw;                /* n */
     int n_grid;
     struct stamp_grid *grid;          /* side classes in use */
+    int lean;                         /* some have no table: the PSF's spline must outlive the plan */
     int n_matrix;
     struct matrix *matrix;
     int rotation_nmax;                /* table for turned objects; -1: none turned */

@@ -97,21 +97,20 @@ double stamp_grid_bytes(double ucut, double pixel, int n, int complex_t)
     return (complex_t ? 2 : 1) * 8.0 * 2 * k * (k + LANES);
 }
 
-/* Multiply rows by y and columns by x, and all by 1 + ipc (cx[column] + cx[row] - 4), cx = 2 cos. */
-static void apply_factors(struct stamp_grid *g, const double *x, const double *y, double ipc, const double *cx)
+/* Row ky of T, columns 0..m-1, times the factors y (row), x (column) and 1 + ipc (cx[column] + cx[row] - 4), cx = 2 cos. */
+static void apply_factors(const struct stamp_grid *g, int ky, int m, double *re, double *im)
 {
-    for (int row = 0; row <= 2 * g->kmax; row++) {
-        const int j = abs(row - g->kmax);
-        double *re = g->t_re + (size_t)row * (size_t)g->ld;
-        double *im = g->t_im ? g->t_im + (size_t)row * (size_t)g->ld : NULL;
-        for (int i = 0; i <= g->kmax; i++) {
-            double f = y[j] * x[i];
-            if (ipc > 0)
-                f *= 1 + ipc * (cx[i] + cx[j] - 4);
-            re[i] *= f;
-            if (im)
-                im[i] *= f;
-        }
+    if (!g->factor)
+        return;
+    const int j = abs(ky), n = g->kmax + 1;
+    const double *x = g->factor, *y = x + n, *cx = y + n;
+    for (int i = 0; i < m; i++) {
+        double f = y[j] * x[i];
+        if (g->ipc > 0)
+            f *= 1 + g->ipc * (cx[i] + cx[j] - 4);
+        re[i] *= f;
+        if (im)
+            im[i] *= f;
     }
 }
 
@@ -126,77 +125,109 @@ void stamp_factors(const struct stamp_response *r, int axis, int n, const double
         otf_box(n, u, r->edge[axis], f);
 }
 
-/* The factors beyond the PSF; u: 0..kmax du, f: 3 (kmax + 1) of scratch. */
-static void factors(struct stamp_grid *g, const struct stamp_response *r, const double *u, double *f)
+/* The factors beyond the PSF. u: 0..kmax du. */
+static int factors(struct stamp_grid *g, const struct stamp_response *r, const double *u)
 {
-    const int n = g->kmax + 1, tall = r->box_y > 0 || r->edge[0] != r->edge[1];
-    double *x = f, *y = tall ? f + n : f, *c = f + 2 * n;
-    if (!(r->diffusion > 0) && !(r->box > 0) && !(r->edge[0] > 0) && !tall && !(r->ipc > 0))
-        return;
-    for (int i = 0; i < n; i++)
-        x[i] = y[i] = 1;
+    const int n = g->kmax + 1;
+    if (!(r->diffusion > 0) && !(r->box > 0) && !(r->box_y > 0) && !(r->edge[0] > 0) && !(r->edge[1] > 0) && !(r->ipc > 0))
+        return OK;
+    double *x = g->factor = malloc(3 * (size_t)n * sizeof *x), *y = x + n;
+    if (!x)
+        return E_NOMEM;
+    for (int i = 0; i < 2 * n; i++)
+        x[i] = 1;
     stamp_factors(r, 0, n, u, x);
-    if (tall)
-        stamp_factors(r, 1, n, u, y);
+    stamp_factors(r, 1, n, u, y);
+    g->ipc = r->ipc;
     if (r->ipc > 0)
-        otf_neighbours(n, u, r->pitch, c);
-    apply_factors(g, x, y, r->ipc, c);
-}
-
-/* Fill t_re, t_im from the PSF's table; u holds the 2 kmax + 1 frequencies from -kmax du. */
-static int tabulate(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double *u,
-                    double *re, double *im, double *f)
-{
-    const int k = g->kmax;
-    for (int i = -k; i <= k; i++)
-        u[i + k] = i * g->du;
-    int st = otf_grid(t, k + 1, u + k, 2 * k + 1, u, re, im);
-    if (st)
-        return st;
-    for (int row = 0; row <= 2 * k; row++) {
-        memcpy(g->t_re + (size_t)row * (size_t)g->ld, re + (size_t)row * (size_t)(k + 1),
-               (size_t)(k + 1) * sizeof *re);
-        if (g->t_im)
-            memcpy(g->t_im + (size_t)row * (size_t)g->ld, im + (size_t)row * (size_t)(k + 1),
-                   (size_t)(k + 1) * sizeof *im);
-    }
-    factors(g, r, u + k, f);
+        otf_neighbours(n, u, r->pitch, y + n);
     return OK;
 }
 
-int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double pixel,
-                   int n)
+/* Rows of a table from the samples of a PSF, by way of a second copy. u: the 2 kmax + 1 frequencies. */
+static int rows_of_samples(struct stamp_grid *g, const struct otf *t, const double *u)
 {
-    if (n < 4 || n > 4096 || n % 2 || !(pixel > 0) || !(t->ucut > 0) || !(t->ucut * pixel < 64) ||
-        !(r->diffusion >= 0) || !(r->box >= 0) || !(r->box_y >= 0) || !(r->edge[0] >= 0) || !(r->edge[1] >= 0) || !(r->ipc >= 0) || !(r->pitch >= 0))
+    const size_t k = (size_t)g->kmax, cols = k + 1, rows = 2 * k + 1;
+    double *re = malloc(2 * rows * cols * sizeof *re), *im = re + rows * cols;
+    int st = re ? otf_grid(t, (int)cols, u + k, (int)rows, u, re, im) : E_NOMEM;
+    for (size_t row = 0; st == OK && row < rows; row++) {
+        memcpy(g->t_re + row * (size_t)g->ld, re + row * cols, cols * sizeof *re);
+        if (g->t_im)
+            memcpy(g->t_im + row * (size_t)g->ld, im + row * cols, cols * sizeof *im);
+    }
+    free(re);
+    return st;
+}
+
+/* Fill t_re, t_im. */
+static int tabulate(struct stamp_grid *g, const struct otf *t, const double *u)
+{
+    const int k = g->kmax, rows = 2 * k + 1;
+    double *line = calloc((size_t)t->n + 8, sizeof *line);
+    g->t_re = calloc((size_t)rows * (size_t)g->ld, sizeof *g->t_re);
+    if (!otf_is_real(t))
+        g->t_im = calloc((size_t)rows * (size_t)g->ld, sizeof *g->t_im);
+    int st = line && g->t_re && (g->t_im || otf_is_real(t)) ? OK : E_NOMEM;
+    if (st == OK && !g->columns)
+        st = rows_of_samples(g, t, u);
+    for (int row = 0; st == OK && row < rows; row++) {
+        double *re = g->t_re + (size_t)row * (size_t)g->ld, *im = g->t_im ? g->t_im + (size_t)row * (size_t)g->ld : NULL;
+        if (g->columns)
+            otf_row(t, g->columns, k + 1, u[row], line, re, im);
+        apply_factors(g, row - k, k + 1, re, im);
+    }
+    free(line);
+    return st;
+}
+
+int stamp_grid_lean(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double pixel, int n, int parts,
+                    int table)
+{
+    if (n < 4 || n > 4096 || n % 2 || parts < 1 || n % parts || n / parts < 2 || !(pixel > 0) || !(t->ucut > 0)
+        || !(t->ucut * pixel < 64) || !(r->diffusion >= 0) || !(r->box >= 0) || !(r->box_y >= 0)
+        || !(r->edge[0] >= 0) || !(r->edge[1] >= 0) || !(r->ipc >= 0) || !(r->pitch >= 0) || (!table && !t->sre))
         return E_RANGE;
-    struct stamp_grid s = {.n = n, .pixel = pixel, .du = 1 / (n * pixel)};
+    struct stamp_grid s = {.n = n, .parts = parts, .pixel = pixel, .du = 1 / (n * pixel), .otf = *t};
     s.kmax = last_frequency(t->ucut, pixel, n);
     s.ld = (int)round8((size_t)s.kmax + 1);
-    size_t rows = 2 * (size_t)s.kmax + 1, cols = (size_t)s.kmax + 1;
-    double *tmp = malloc((2 * rows * cols + rows + 3 * cols) * sizeof *tmp);
-    s.t_re = calloc(rows * (size_t)s.ld, sizeof *s.t_re);
-    const int real = otf_is_real(t);
-    s.t_im = real ? NULL : calloc(rows * (size_t)s.ld, sizeof *s.t_im);
-    int st = !tmp || !s.t_re || (!real && !s.t_im) ? E_NOMEM : OK;
+    const int k = s.kmax;
+    double *u = malloc((2 * (size_t)k + 1) * sizeof *u);
+    int st = u ? OK : E_NOMEM;
+    for (int i = -k; st == OK && i <= k; i++)
+        u[i + k] = i * s.du;
     if (st == OK)
-        st = tabulate(&s, t, r, tmp + 2 * rows * cols, tmp, tmp + rows * cols, tmp + 2 * rows * cols + rows);
+        st = factors(&s, r, u + k);
+    if (st == OK && t->sre)
+        st = otf_columns_new(&s.columns, t, k + 1, u + k);
+    if (st == OK && table)
+        st = tabulate(&s, t, u);
     if (st == OK)
-        st = lanes_new(&s.fft, n);
-    free(tmp);
-    if (st) {
-        free(s.t_re);
-        free(s.t_im);
-        return st;
+        st = lanes_new_rows(&s.fft, n, n / parts);
+    free(u);
+    if (table) {
+        otf_columns_free(s.columns);
+        free(s.factor);
+        s.columns = NULL;
+        s.factor = NULL;
     }
-    *g = s;
-    return OK;
+    if (st)
+        stamp_grid_free(&s);
+    else
+        *g = s;
+    return st;
+}
+
+int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double pixel, int n)
+{
+    return stamp_grid_lean(g, t, r, pixel, n, 1, 1);
 }
 
 void stamp_grid_free(struct stamp_grid *g)
 {
     free(g->t_re);
     free(g->t_im);
+    free(g->factor);
+    otf_columns_free(g->columns);
     lanes_free(g->fft);
     *g = (struct stamp_grid){0};
 }
@@ -237,6 +268,7 @@ struct transform {
     double u[3];               /* mapped: (u0 kx + u1 ky, u2 ky) */
     double *p_re, *p_im, *y_re, *y_im;   /* phases along x and y */
     double *acc[4];            /* folded rows */
+    double *line, *t[4];       /* without a table: scratch of otf_row; rows +-ky of T */
 };
 
 /* c (-i)^(n1+n2) as a real number that belongs to the real (n even) or imaginary part (n odd). */
@@ -407,9 +439,14 @@ static int transform_start(struct transform *t, struct stamp_work *w, const stru
     t->ld = (int)round8((size_t)columns);
     const size_t ld = (size_t)t->ld, h = round8((size_t)g->n / 2 + 1), orders = (size_t)(t->nmax + 1);
     const size_t nc = s->coef ? shapelet_count(s->nmax) : 0;
-    int st = arena_reset(w, 4 * orders * ld + 9 * ld + 4 * h + 2 * round8(nc));
+    const size_t line = g->columns ? round8((size_t)g->otf.n + 8) : 0;
+    int st = arena_reset(w, 4 * orders * ld + 13 * ld + 4 * h + 2 * round8(nc) + line);
     if (st)
         return st;
+    t->line = arena_take(w, line);
+    memset(t->line, 0, line * sizeof *t->line);
+    for (int i = 0; i < 4; i++)
+        t->t[i] = g->columns && (i < 2 || g->otf.sim) ? arena_take(w, ld) : NULL;
     t->phi = arena_take(w, orders * ld);
     t->phi_y = t->phi;
     t->ve = arena_take(w, orders * ld);
@@ -470,7 +507,7 @@ struct plane {
 /* Rows +-ky, all bands beyond the grid's own frequencies added onto it. */
 static void add_folded(const struct transform *t, int ky, int m, double c, double d, const struct row *r, const struct plane *f)
 {
-    const int n = t->g->n, h = n / 2, row = ky % n, mirror = (n - row) % n;
+    const int n = t->g->n, h = n / 2, rows = n / t->g->parts, row = ky % rows, mirror = (rows - row) % rows;
     for (int i = 0; i < 4; i++)
         memset(t->acc[i], 0, ((size_t)h + 1) * sizeof(double));
     row_fold(n, m, r->p_re, r->p_im, t->acc[0], t->acc[1], t->acc[2], t->acc[3]);
@@ -483,13 +520,13 @@ static void add_folded(const struct transform *t, int ky, int m, double c, doubl
 /* Rows +-ky when there is only the one band. */
 static void put_row(const struct transform *t, int ky, int m, double c, double d, const struct row *r, const struct plane *f)
 {
-    const size_t up = (size_t)ky * f->ld, down = (size_t)(t->g->n - ky) * f->ld;
+    const size_t up = (size_t)ky * f->ld, down = (size_t)(t->g->n / t->g->parts - ky) * f->ld;
     row_store(m, f->columns, r->p_re, r->p_im, c, d, f->re + up, f->im + up);
     if (ky > 0)
         row_store(m, f->columns, r->m_re, r->m_im, c, -d, f->re + down, f->im + down);
 }
 
-/* Zero what rows of one band leave out, or everything. */
+/* Zero what rows of one band leave out, or everything, of n rows. */
 static void clear(const struct plane *f, int n, int single, int top)
 {
     for (int row = single ? top + 1 : 0; row < (single ? n - top : n); row++) {
@@ -498,51 +535,117 @@ static void clear(const struct plane *f, int n, int single, int top)
     }
 }
 
+/* Row ky of T, columns 0..m-1: of the table, or made in `side` 0, 1 of the scratch. */
+static void transfer_row(const struct transform *t, int ky, int m, int side, const double **re, const double **im)
+{
+    const struct stamp_grid *g = t->g;
+    if (!g->columns) {
+        const size_t at = (size_t)(g->kmax + ky) * (size_t)g->ld;
+        *re = g->t_re + at;
+        *im = g->t_im ? g->t_im + at : NULL;
+        return;
+    }
+    otf_row(&g->otf, g->columns, m, ky * g->du, t->line, t->t[side], t->t[2 + side]);
+    apply_factors(g, ky, m, t->t[side], t->t[2 + side]);
+    *re = t->t[side];
+    *im = t->t[2 + side];
+}
+
 /* All rows: transform, transfer function, phases, aliases; into f. */
 static int fold_rows(const struct transform *t, double kcut, double scale, const struct row *r, const struct plane *f)
 {
     const struct stamp_grid *g = t->g;
-    const int top = kcut < g->kmax ? (int)kcut : g->kmax, single = top < g->n / 2;
-    clear(f, g->n, single, top);
+    const int rows = g->n / g->parts, top = kcut < g->kmax ? (int)kcut : g->kmax, single = top < rows / 2;
+    clear(f, rows, single, top);
     for (int ky = 0; ky <= top; ky++) {
         double reach = sqrt(kcut * kcut - (double)ky * ky);
         int m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
+        const double *up[2], *down[2];
         int st = transform_row(t, ky, m, r);
         if (st)
             return st;
-        size_t up = (size_t)(g->kmax + ky) * (size_t)g->ld, down = (size_t)(g->kmax - ky) * (size_t)g->ld;
-        row_transfer(m, g->t_re + up, g->t_im ? g->t_im + up : NULL, t->p_re, t->p_im, r->p_re, r->p_im);
-        row_transfer(m, g->t_re + down, g->t_im ? g->t_im + down : NULL, t->p_re, t->p_im, r->m_re, r->m_im);
+        transfer_row(t, ky, m, 0, &up[0], &up[1]);
+        row_transfer(m, up[0], up[1], t->p_re, t->p_im, r->p_re, r->p_im);
+        transfer_row(t, -ky, m, 1, &down[0], &down[1]);
+        row_transfer(m, down[0], down[1], t->p_re, t->p_im, r->m_re, r->m_im);
         (single ? put_row : add_folded)(t, ky, m, scale * t->y_re[ky], scale * t->y_im[ky], r, f);
     }
     return OK;
 }
 
-int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y,
-                  double flux, double kcut, double *out)
+/* Half planes of width stamp_width(n): columns 0..n/2 and more, a multiple of 8. */
+static size_t stamp_width(int n)
 {
-    if (!(kcut >= 0) || !isfinite(x) || !isfinite(y) || !isfinite(flux) ||
-        (s->coef && (s->nmax < 0 || s->nmax > SHAPELET_NMAX || !(s->beta_x > 0) || !(s->beta_y > 0))))
-        return E_RANGE;
+    return round8((size_t)n / 2 + 1);
+}
+
+size_t stamp_stride(int n)
+{
+    return 2 * stamp_width(n);
+}
+
+/* The frequencies of a part, folded into f; doubles of scratch behind which rows are kept. */
+static int frequencies(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
+                       double kcut, double *rows, struct plane *f)
+{
     const int columns = 1 + (kcut < g->kmax ? (int)kcut : g->kmax);
-    const size_t ld = round8((size_t)columns), width = round8((size_t)g->n / 2 + 1), nfreq = (size_t)g->n * width;
+    const size_t ld = round8((size_t)columns);
     struct transform t = {0};
-    int st = freq_need(w, 2 * nfreq + round8(lanes_scratch(g->fft)) + 4 * ld);
-    if (st == OK)
-        st = transform_start(&t, w, g, s, columns);
+    int st = transform_start(&t, w, g, s, columns);
     if (st)
         return st;
     phases(t.ld, x, g->n, t.p_re, t.p_im);
     phases(t.ld, y, g->n, t.y_re, t.y_im);
-    double *scratch = w->freq + 2 * nfreq, *rows = scratch + round8(lanes_scratch(g->fft));
     const struct row r = {rows, rows + ld, rows + 2 * ld, rows + 3 * ld};
-    const struct plane f = {w->freq, w->freq + nfreq, width, columns < g->n / 2 + 1 ? columns : g->n / 2 + 1};
+    f->columns = columns < g->n / 2 + 1 ? columns : g->n / 2 + 1;
     double scale = flux / ((double)g->n * g->n);
     if (s->coef)
         scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
-    st = fold_rows(&t, kcut, scale, &r, &f);
+    return fold_rows(&t, kcut, scale, &r, f);
+}
+
+static int drawable(const struct shape *s, double x, double y, double flux, double kcut)
+{
+    return kcut >= 0 && isfinite(x) && isfinite(y) && isfinite(flux)
+           && (!s->coef || (s->nmax >= 0 && s->nmax <= SHAPELET_NMAX && s->beta_x > 0 && s->beta_y > 0));
+}
+
+/* Doubles of four rows of frequencies. */
+static size_t rows_need(const struct stamp_grid *g, double kcut)
+{
+    return 4 * round8((size_t)(1 + (kcut < g->kmax ? (int)kcut : g->kmax)));
+}
+
+int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y,
+                  double flux, double kcut, double *out)
+{
+    if (!drawable(s, x, y, flux, kcut) || g->parts != 1)
+        return E_RANGE;
+    const size_t width = stamp_width(g->n), nfreq = (size_t)g->n * width;
+    int st = freq_need(w, 2 * nfreq + round8(lanes_scratch(g->fft)) + rows_need(g, kcut));
+    if (st)
+        return st;
+    double *scratch = w->freq + 2 * nfreq, *rows = scratch + round8(lanes_scratch(g->fft));
+    struct plane f = {w->freq, w->freq + nfreq, width, 0};
+    st = frequencies(g, w, s, x, y, flux, kcut, rows, &f);
     if (st == OK)
         lanes_run(g->fft, f.columns, f.re, f.im, (int)width, scratch, out);
+    return st;
+}
+
+int stamp_fourier_part(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
+                       double kcut, int part, double *plane)
+{
+    if (!drawable(s, x, y, flux, kcut) || part < 0 || part >= g->parts)
+        return E_RANGE;
+    const size_t width = stamp_width(g->n), scratch = round8(lanes_scratch(g->fft));
+    int st = freq_need(w, scratch + rows_need(g, kcut));
+    if (st)
+        return st;
+    struct plane f = {plane, plane + width, 2 * width, 0};
+    st = frequencies(g, w, s, x, y - part, flux, kcut, w->freq + scratch, &f);
+    if (st == OK)
+        lanes_run_in_place(g->fft, f.columns, plane, (int)width, (int)(2 * width), w->freq);
     return st;
 }
 

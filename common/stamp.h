@@ -42,11 +42,16 @@ struct shape {
 /* What all stamps of one side share. */
 struct stamp_grid {
     int n;                 /* pixels per side, even */
+    int parts;             /* made in so many parts: rows y = part, part + parts, ... */
     int kmax;              /* frequencies -kmax..kmax per axis, du apart */
     int ld;                /* row length of t_re, t_im: kmax + 1 rounded up to 8 */
     double du;             /* cycles/arcsec */
     double pixel;          /* arcsec */
     double *t_re, *t_im;   /* (2 kmax + 1) x ld: rows u_y = -kmax du .., columns u_x >= 0; t_im NULL: real */
+    double *factor;        /* along x, y, and 2 cos of the neighbours: kmax + 1 each, owned; NULL: none */
+    double ipc;
+    struct otf_columns *columns;   /* without a table: rows of T are made for each stamp */
+    struct otf otf;        /* from this spline, not owned */
     struct lanes *fft;
 };
 
@@ -69,8 +74,14 @@ void stamp_factors(const struct stamp_response *r, int axis, int n, const double
 /* Tabulate; n even, 4..4096. E_RANGE, E_NOMEM. */
 MUST_CHECK int stamp_grid_new(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r,
                               double pixel, int n);
+/*
+ * For stamps made in parts (a divisor of n), with the table or, when t is a table itself and outlives g, without:
+ * the same bits, but memory for two rows per thread instead of all, and time for each stamp.
+ */
+MUST_CHECK int stamp_grid_lean(struct stamp_grid *g, const struct otf *t, const struct stamp_response *r, double pixel, int n,
+                               int parts, int table);
 void stamp_grid_free(struct stamp_grid *g);
-/* Bytes that stamp_grid_new takes. */
+/* Bytes of the table. */
 double stamp_grid_bytes(double ucut, double pixel, int n, int complex_t);
 
 /* Scratch memory of one thread, grown when needed. */
@@ -85,6 +96,14 @@ void stamp_work_free(struct stamp_work *w);
  */
 MUST_CHECK int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s,
                              double x, double y, double flux, double kcut, double *out);
+
+/*
+ * One part of it: rows part, part + parts, ... of the stamp, stamp_stride(n) doubles from one to the next, in
+ * n / parts * stamp_stride(n) doubles, aligned to 64 bytes, that also serve for the frequencies.
+ */
+MUST_CHECK int stamp_fourier_part(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y,
+                                  double flux, double kcut, int part, double *plane);
+size_t stamp_stride(int n);
 
 /* ---- without a PSF ---- */
 
