@@ -286,6 +286,52 @@ static void identities(struct stamp_work *w)
     free(c);
 }
 
+/* Rows made from the spline are those of the table, bit for bit; interlaced parts make up the whole stamp. */
+static void lean(struct stamp_work *w)
+{
+    const int n = 48;
+    double *c = galaxy(8, 0.1), *a = fft_alloc((size_t)(n * n) * sizeof *a), *b = fft_alloc((size_t)n * stamp_stride(n) * sizeof *b);
+    const struct shape s[3] = {{0}, {.nmax = 8, .beta_x = 0.1, .beta_y = 0.13, .coef = c},
+                               {.nmax = 8, .beta_x = 0.1, .beta_y = 0.1, .coef = c, .mapped = 1, .a = {1.1, 0.2, 0, 1 / 1.1}}};
+    struct check parts = check_begin("interlaced parts of a stamp = the stamp, of the peak");
+    int same = 1;
+    for (int kind = 0; kind < 12; kind++) {
+        const double pixel = kind & 1 ? 0.03 : 0.16, kcut = kind < 6 ? 1e9 : 21.5;
+        const int divisor = 2 + kind % 3;
+        struct otf t = {0};
+        struct stamp_grid whole = {0}, spline = {0}, cut = {0};
+        const struct stamp_response r = {.diffusion = 0.03, .box = pixel, .edge = {0, 0.02}, .ipc = 0.01, .pitch = pixel};
+        telescope(&t, kind / 2 % 2);
+        if (stamp_grid_new(&whole, &t, &r, pixel, n) || stamp_grid_lean(&spline, &t, &r, pixel, n, 1, 0)
+            || stamp_grid_lean(&cut, &t, &r, pixel, n, divisor, kind / 3 % 2))
+            exit(1);
+        for (int o = 0; o < 3; o++) {
+            if (stamp_fourier(&whole, w, &s[o], 23.71, 24.2, 2, kcut, a) || stamp_fourier(&spline, w, &s[o], 23.71, 24.2, 2, kcut, b))
+                exit(1);
+            same = same && memcmp(a, b, (size_t)(n * n) * sizeof *a) == 0;
+            const double peak = peak_of((size_t)(n * n), a);
+            for (int part = 0; part < divisor; part++) {
+                if (stamp_fourier_part(&cut, w, &s[o], 23.71, 24.2, 2, kcut, part, b))
+                    exit(1);
+                for (int y = part; y < n; y += divisor)
+                    for (int x = 0; x < n; x++)
+                        check_close(&parts, b[(size_t)(y / divisor) * stamp_stride(n) + (size_t)x] / peak, a[y * n + x] / peak, 3e-15);
+            }
+        }
+        check_that(stamp_fourier_part(&cut, w, &s[0], 1, 1, 1, 9, divisor, b) == E_RANGE && stamp_fourier(&cut, w, &s[0], 1, 1, 1, 9, b) == E_RANGE,
+                   "%d parts: one more and the whole are refused", divisor);
+        stamp_grid_free(&whole);
+        stamp_grid_free(&spline);
+        stamp_grid_free(&cut);
+        otf_free(&t);
+    }
+    check_end(&parts);
+    check_that(same, "stamps without a table have the bits of those with one");
+    free(c);
+    fft_free(a);
+    fft_free(b);
+}
+
 /* ---- truth files ---- */
 
 /* PSF of ../shared/truth/galsim as samples with its cut-off. */
@@ -402,6 +448,7 @@ int main(void)
     point();
     with_psf(w);
     identities(w);
+    lean(w);
     truth(w);
     stamp_work_free(w);
     return check_status();
