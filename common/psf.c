@@ -151,8 +151,15 @@ int psf_image(const struct otf *t, double diffusion, double pixel, int nx, int n
     int status = nodes_make(t, diffusion, pixel, &g);
     if (status)
         return status;
-    /* T(-u) is the conjugate of T(u): the rows u_y > 0 count twice, the others not at all */
+    /*
+     * T(-u) is the conjugate of T(u): the rows u_y > 0 count twice, the others not at all.  Nodes on the cut-off itself,
+     * where the T of samples need not vanish, count half: the sum then gives those samples back.
+     */
     int h = g.n / 2;
+    if (h > 0 && h * g.du >= t->ucut * (1 - 1e-9)) {
+        g.f[0] *= 0.5;
+        g.f[2 * h] *= 0.5;
+    }
     size_t pixels = (size_t)nx * (size_t)ny;
     double *in = malloc(2 * (size_t)(h + 1) * (size_t)g.n * sizeof *in), *out = malloc(2 * pixels * sizeof *out);
     status = in && out ? OK : E_NOMEM;

@@ -145,14 +145,14 @@ static int read_otf(struct fits_in *f, const char *name, int index, const struct
     return status;
 }
 
-/* Arcsec per sample: option, PIXELSCL, PIXSCALE, WCS. */
+/* Arcsec per sample: option, PIXELSCL, PIXSCALE, GalSim's GS_SCALE, WCS. */
 static int sampling(const char *name, const struct header *h, const struct psf_options *o, double *scale, struct err *e)
 {
-    static const char *const keys[] = {"PIXELSCL", "PIXSCALE"};
+    static const char *const keys[] = {"PIXELSCL", "PIXSCALE", "GS_SCALE"};
     *scale = o->scale;
     if (*scale > 0)
         return OK;
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 3; k++) {
         int status = header_double(h, keys[k], scale);
         if (status == OK && *scale > 0)
             return OK;
@@ -161,7 +161,7 @@ static int sampling(const char *name, const struct header *h, const struct psf_o
     }
     struct sky *s = NULL;
     if (sky_open(&s, h, NULL) != OK)
-        return err_set(e, E_DATA, "%s: no PIXELSCL, PIXSCALE or WCS tells the PSF's sampling: give --psf-scale", name);
+        return err_set(e, E_DATA, "%s: no PIXELSCL, PIXSCALE, GS_SCALE or WCS tells the PSF's sampling: give --psf-scale", name);
     *scale = sky_scale(s);
     sky_close(s);
     if (!(*scale > 0) || !isfinite(*scale))
@@ -185,7 +185,11 @@ static int read_samples(struct fits_in *f, const char *name, int index, const st
     double sum = 0, nyquist = 0.5 / scale, ucut = header_double_or(h, "UCUT", nyquist);
     for (size_t i = 0; i < count; i++)
         sum += v[i];
-    double cx = header_double_or(h, "CRPIX1", (double)(d->nx + 1) / 2), cy = header_double_or(h, "CRPIX2", (double)(d->ny + 1) / 2);
+    double cx = (double)(d->nx + 1) / 2, cy = (double)(d->ny + 1) / 2, unused;
+    if (header_double(h, "GS_SCALE", &unused)) {       /* GalSim draws at the middle; its CRPIX is that of its coordinates */
+        cx = header_double_or(h, "CRPIX1", cx);
+        cy = header_double_or(h, "CRPIX2", cy);
+    }
     ucut = o->cutoff > 0 ? o->cutoff : ucut > 0 ? ucut : nyquist;
     status = check_sum(name, sum, e);
     if (status == OK && !(cx >= 0.5 && cx <= (double)d->nx + 0.5 && cy >= 0.5 && cy <= (double)d->ny + 0.5))
@@ -203,7 +207,7 @@ static int read_samples(struct fits_in *f, const char *name, int index, const st
     return status;
 }
 
-/* A PSFEx model: samples as polynomials in position. */
+/* A PSFEx model: samples as polynomials in position, in units of flux per pixel of the image. */
 struct psfex {
     long nx, ny, terms;        /* PSFAXIS1 to 3 */
     long axes, degree;         /* POLNAXIS 0..2, POLDEG1 */
@@ -271,7 +275,7 @@ static int read_psfex(struct fits_in *f, const char *name, int index, const stru
     if (status == OK) {
         psfex_evaluate(&m, o, v);
         for (size_t i = 0; i < (size_t)m.nx * (size_t)m.ny; i++)
-            sum += v[i];
+            sum += v[i] *= m.samp * m.samp;
         status = check_sum(name, sum, e);
     }
     if (status == OK) {

@@ -112,13 +112,31 @@ if [ -r "$SHARED/data/hdf/wfpc2_f814w_psf.fits" ]; then
 else
     skip "no WFPC2 PSF"
 fi
+# as others write them: STPSF (PIXELSCL, no CRPIX, extensions of other samplings), TinyTim (PIXSCALE), GalSim (GS_SCALE, LINEAR
+# coordinates whose CRPIX is not the PSF): a Gaussian of 0.06", its origin in the middle
+F="perl $TOP/tests/fits.pl"
+E='exp(-(($x-31.5)**2+($y-31.5)**2)/72)/(72*atan2(0,-1))'
+$F make stpsf.fits 64 64 "$E" "PIXELSCL=                 0.01" "OVERSAMP=                    4" "EXTNAME = 'OVERSAMP'"
+$F add stpsf.fits 16 16 '$x==8&&$y==8' "EXTNAME = 'DET_SAMP'" "PIXELSCL=                 0.04"
+$F make tiny.fits 64 64 "$E" "INSTRUME= 'WFPC2'" "PIXSCALE=                 0.01"
+$F make galsim.fits 64 64 "$E" "GS_WCS  = 'PixelScale'" "GS_SCALE=                 0.01" "CTYPE1  = 'LINEAR  '" "CTYPE2  = 'LINEAR  '" "CRVAL1  =                  0.0" \
+    "CRVAL2  =                  0.0" "CRPIX1  =                  0.0" "CRPIX2  =                  0.0" "CD1_1   =                 0.01" "CD1_2   =                  0.0" \
+    "CD2_1   =                  0.0" "CD2_2   =                 0.01"
+for p in stpsf tiny galsim; do
+    ok "a PSF like $p's" psfgen --from $p.fits --scale 0.01 --size 64 -o got.fits
+    near "$p: FWHM of sigma 0.06\"" "$(card got.fits PSFFWHM)" 0.141289 2e-5
+    near "$p: the samples come back (T is cut at 1e-6), of the peak" "$(pix diff got.fits $p.fits | cut -d' ' -f1)" 0 1e-6
+    printf '# X_IMAGE Y_IMAGE FLUX TYPE\n16.5 16.5 1 star\n' >star.txt
+    simage star.txt -p $p.fits -x 0.04 --size 32,32 -T 1 --accuracy 1e-4 -o got.fits
+    near "$p: a star's middle" "$($F dump got.fits 0 | awk '{ s += $3; x += $1 * $3; y += $2 * $3 } END { printf "%.9f", (x + y) / s }')" 31 1e-5
+done
 # a PSFEx model of degree 1: planes g, .1 g, -.2 g with g a Gaussian of 2 samples, .4 pixel each
 if [ -n "$python" ]; then
     "$python" - <<'END' 2>py.err
 import numpy as np
 from astropy.io import fits
 y, x = np.mgrid[:31, :31] - 15.
-g = np.exp(-(x * x + y * y) / 8) / (8 * np.pi)
+g = np.exp(-(x * x + y * y) / 8) / (8 * np.pi) / .4 ** 2          # flux per pixel, as PSFEx writes
 def write(name, planes, **more):
     c = [fits.Column("FLAG", "J", array=[7]), fits.Column("PSF_MASK", "%dE" % planes.size, dim=str(planes.shape[::-1]), array=[planes.astype("f4")])]
     t = fits.BinTableHDU.from_columns(c, name="PSF_DATA")
