@@ -511,53 +511,109 @@ static int mesh_rows(struct mesh *m)
     return OK;
 }
 
-/* out[i] = cubic at t0 + (first + i) dt; the same bits wherever a piece begins. */
-WIDE static void polynomial(float t0, float dt, const float c[4], int first, int n, float *restrict out)
+/* Pixels from .. to-1 of a row: the cubic c at t = start + (place - anchor) * spacing of the mesh. */
+struct piece {
+    int32_t from, to;          /* relative to the first pixel asked for */
+    int32_t shift;             /* of that pixel from the anchor */
+    float start, c[4];
+};
+
+enum { PIECES = 16 };
+
+/* The cubic of the interval from node k on (-1 and mx - 1: the lines beyond the outermost nodes) in row y. */
+static struct piece piece_of(const struct mesh *m, long k, long y, double h, long x0)
 {
-    float c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3];
-    for (int i = 0; i < n; i++) {
-        float t = t0 + dt * (float)(first + i);
-        out[i] = c0 + t * (c1 + t * (c2 + t * c3));
+    long i = k < 0 ? 0 : k > m->mx - 2 ? m->mx - 2 : k;
+    double v0[2], v1[2], c[4];
+    column_of_row(m, i, y, v0);
+    column_of_row(m, i + 1, y, v1);
+    cubic(v0[0], v1[0], v0[1], v1[1], c);
+    if (k < 0)
+        c[2] = c[3] = 0;
+    if (k == m->mx - 1) {              /* the line at the end of the last interval */
+        double slope = c[1] + 2 * c[2] + 3 * c[3], last = c[0] + c[1] + c[2] + c[3];
+        c[0] = last - slope;
+        c[1] = slope;
+        c[2] = c[3] = 0;
+    }
+    long anchor = k < 0 ? 0 : m->first[k];
+    return (struct piece){0, 0, (int32_t)(x0 - anchor), (float)(((double)anchor + 0.5) * h - 0.5 - (double)i),
+                          {(float)c[0], (float)c[1], (float)c[2], (float)c[3]}};
+}
+
+/* The node interval of pixel x: -1 .. mx - 1. */
+static long interval_of(const struct mesh *m, double h, long x)
+{
+    long k = (long)floor(((double)x + 0.5) * h - 0.5 + 1e-9);
+    k = k < -1 ? -1 : k > m->mx - 1 ? m->mx - 1 : k;
+    while (k >= 0 && m->first[k] > x)
+        k--;
+    return k;
+}
+
+/*
+ * The pieces of row y from pixel x0 + *done on, at most PIECES, of n pixels asked
+ * for; *k is the next interval, *done how many pixels they cover.
+ */
+static int next_pieces(const struct mesh *m, double h, long y, long x0, long n, long *k, long *done,
+                       struct piece p[PIECES])
+{
+    int count = 0;
+    if (m->mx == 1) {
+        double v[2];
+        column_of_row(m, 0, y, v);
+        p[0] = (struct piece){0, (int32_t)n, 0, 0, {(float)v[0], 0, 0, 0}};
+        *done = n;
+        return 1;
+    }
+    for (; *done < n && count < PIECES; (*k)++) {
+        long stop = *k == m->mx - 1 || m->first[*k + 1] > x0 + n ? n : m->first[*k + 1] - x0;
+        if (stop <= *done)
+            continue;
+        p[count] = piece_of(m, *k, y, h, x0);
+        p[count].from = (int32_t)*done;
+        p[count++].to = (int32_t)stop;
+        *done = stop;
+    }
+    return count;
+}
+
+/* The same bits wherever a piece begins. */
+static inline float piece_at(const struct piece *p, float dt, int i)
+{
+    float t = p->start + dt * (float)(p->shift + i);
+    return p->c[0] + t * (p->c[1] + t * (p->c[2] + t * p->c[3]));
+}
+
+WIDE static void fill_pieces(const struct piece *p, int count, float dt, float *restrict out)
+{
+    for (int k = 0; k < count; k++) {
+        struct piece q = p[k];
+        for (int i = q.from; i < q.to; i++)
+            out[i] = piece_at(&q, dt, i);
+    }
+}
+
+/* out = finite(pix) ? (pix - pivot) - mesh : blank */
+WIDE static void subtract_pieces(const struct piece *p, int count, float dt, const float *restrict pix, float pivot,
+                                 float blank, float *restrict out)
+{
+    for (int k = 0; k < count; k++) {
+        struct piece q = p[k];
+        for (int i = q.from; i < q.to; i++) {
+            float v = (pix[i] - pivot) - piece_at(&q, dt, i);
+            out[i] = fabsf(v) <= FLT_MAX ? v : blank;
+        }
     }
 }
 
 void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
 {
+    struct piece p[PIECES];
     double h = (double)m->mx / (double)m->nx;
-    long x = x0, end = x0 + n;
-    if (m->mx == 1) {
-        double v[2];
-        column_of_row(m, 0, y, v);
-        for (long i = 0; i < n; i++)
-            out[i] = (float)v[0];
-        return;
-    }
-    long k = (long)floor(((double)x + 0.5) * h - 0.5 + 1e-9);
-    k = k < -1 ? -1 : k > m->mx - 1 ? m->mx - 1 : k;
-    while (k >= 0 && m->first[k] > x)
-        k--;
-    for (; x < end; k++) {                     /* from node k to the next; -1 and mx - 1 are the lines beyond */
-        long i = k < 0 ? 0 : k > m->mx - 2 ? m->mx - 2 : k;
-        long stop = k == m->mx - 1 || m->first[k + 1] > end ? end : m->first[k + 1];
-        if (stop <= x)
-            continue;
-        double v0[2], v1[2], c[4];
-        column_of_row(m, i, y, v0);
-        column_of_row(m, i + 1, y, v1);
-        cubic(v0[0], v1[0], v0[1], v1[1], c);
-        if (k < 0)
-            c[2] = c[3] = 0;
-        if (k == m->mx - 1) {          /* the line at the end of the last interval */
-            double slope = c[1] + 2 * c[2] + 3 * c[3], last = c[0] + c[1] + c[2] + c[3];
-            c[0] = last - slope;
-            c[1] = slope;
-            c[2] = c[3] = 0;
-        }
-        long anchor = k < 0 ? 0 : m->first[k];
-        float f[4] = {(float)c[0], (float)c[1], (float)c[2], (float)c[3]};
-        float start = (float)(((double)anchor + 0.5) * h - 0.5 - (double)i);
-        polynomial(start, (float)h, f, (int)(x - anchor), (int)(stop - x), out + (x - x0));
-        x = stop;
+    for (long done = 0, k = interval_of(m, h, x0); done < n;) {
+        int count = next_pieces(m, h, y, x0, n, &k, &done, p);
+        fill_pieces(p, count, (float)h, out);
     }
 }
 
@@ -568,21 +624,16 @@ double mesh_at(const struct mesh *m, long x, long y)
     return m->pivot + (double)v;
 }
 
-/* out = finite(pix) ? (pix - pivot) - out : blank */
-WIDE static void subtract(const float *restrict pix, float pivot, float blank, long n,
-                          float *restrict out)
-{
-    for (long i = 0; i < n; i++) {
-        float v = (pix[i] - pivot) - out[i];
-        out[i] = fabsf(v) <= FLT_MAX ? v : blank;
-    }
-}
-
 void background_subtract(const struct background *b, const float *pix, long y, long x0, long n,
                          float blank, float *out)
 {
-    mesh_row(&b->level, y, x0, n, out);
-    subtract(pix, (float)b->level.pivot, blank, n, out);
+    const struct mesh *m = &b->level;
+    struct piece p[PIECES];
+    double h = (double)m->mx / (double)m->nx;
+    for (long done = 0, k = interval_of(m, h, x0); done < n;) {
+        int count = next_pieces(m, h, y, x0, n, &k, &done, p);
+        subtract_pieces(p, count, (float)h, pix, (float)m->pivot, blank, out);
+    }
 }
 
 /* ---- all together ---- */
