@@ -297,47 +297,64 @@ static struct aperture_sum circle_sum(const struct field *f, const struct stamp 
 
 /* ---- the Gaussian core ---- */
 
-/* w[i] = exp(-(i - c)^2 / 2 w2) for 0 <= i < n, by steps from the peak outwards. */
-static void gaussian_line(double c, double w2, long n, double *w)
+/* A Gaussian of variance w2; step2 = exp(-1 / w2). */
+struct gauss {
+    double w2, step2;
+};
+
+static struct gauss gauss_of(double w2)
 {
-    double near = nearbyint(c), step2 = exp(-1 / w2);
+    return (struct gauss){w2, exp(-1 / w2)};
+}
+
+/* w[i] = exp(-(i - c)^2 / 2 w2) for 0 <= i < n, by steps from the peak outwards. */
+static void gaussian_line(const struct gauss *g, double c, long n, double *w)
+{
+    double near = nearbyint(c);
     long top = near > 0 ? near < (double)(n - 1) ? (long)near : n - 1 : 0;
     double d = (double)top - c;
-    w[top] = exp(-0.5 * d * d / w2);
-    double up = exp(-(d + 0.5) / w2), down = exp((d - 0.5) / w2);
-    for (long i = top + 1; i < n; i++, up *= step2)
+    w[top] = exp(-0.5 * d * d / g->w2);
+    double up = exp(-(d + 0.5) / g->w2), down = exp((d - 0.5) / g->w2);
+    for (long i = top + 1; i < n; i++, up *= g->step2)
         w[i] = w[i - 1] * up;
-    for (long i = top; i-- > 0; down *= step2)
+    for (long i = top; i-- > 0; down *= g->step2)
         w[i] = w[i + 1] * down;
 }
 
-/* Sums over a row of v t, v t x, v t x^2 with the tables t, t x, t x^2 of n values each (n a multiple of LANES). */
-static inline void row_sums(const float *v, const double *t, long n, double out[3][LANES])
-{
-    for (long i = 0; i < n; i += LANES)
-        for (int j = 0; j < LANES; j++) {
-            double f = (double)v[i + j];
-            out[0][j] += f * t[i + j];
-            out[1][j] += f * t[n + i + j];
-            out[2][j] += f * t[2 * n + i + j];
-        }
-}
+/* Weights of columns (n, a multiple of LANES) and rows, with the distances from the centre. */
+struct weights {
+    const double *wx, *dx, *wy, *dy;
+    long n, rows;
+};
 
-/* The sums of all rows: sum v W, v W dx, v W dy, v W r^2; rows weighted with wy about dy0. */
-WIDE static void stamp_sums(const float *v, long stride, long n, long rows, const double *table, const double *wy,
-                            double dy0, double out[4])
+/* Sums of v W, v W r^2, v W dx, v W dy, LANES columns at a time. */
+WIDE static void stamp_sums(const float *v, long stride, const struct weights *w, double out[4])
 {
-    out[0] = out[1] = out[2] = out[3] = 0;
-    for (long y = 0; y < rows; y++) {
-        double s[3][LANES] = {{0}}, sum[3] = {0}, dy = dy0 + (double)y;
-        row_sums(v + y * stride, table, n, s);
-        for (int k = 0; k < 3; k++)
-            for (int j = 0; j < LANES; j++)
-                sum[k] += s[k][j];
-        out[0] += wy[y] * sum[0];
-        out[1] += wy[y] * sum[1];
-        out[2] += wy[y] * sum[0] * dy;
-        out[3] += wy[y] * (sum[2] + sum[0] * dy * dy);
+    double t[4][LANES] = {{0}};
+    for (long x = 0; x < w->n; x += LANES) {
+        double s[3][LANES] = {{0}};        /* of the rows: weighted by wy, wy dy, wy dy^2 */
+        for (long y = 0; y < w->rows; y++) {
+            double w0 = w->wy[y], w1 = w0 * w->dy[y], w2 = w1 * w->dy[y];
+            const float *p = v + y * stride + x;
+            for (int j = 0; j < LANES; j++) {
+                double f = (double)p[j];
+                s[0][j] += w0 * f;
+                s[1][j] += w1 * f;
+                s[2][j] += w2 * f;
+            }
+        }
+        for (int j = 0; j < LANES; j++) {
+            double wx = w->wx[x + j], dx = w->dx[x + j];
+            t[0][j] += wx * s[0][j];
+            t[1][j] += wx * (s[2][j] + dx * dx * s[0][j]);
+            t[2][j] += wx * dx * s[0][j];
+            t[3][j] += wx * s[1][j];
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        out[k] = 0;
+        for (int j = 0; j < LANES; j++)
+            out[k] += t[k][j];
     }
 }
 
@@ -345,9 +362,9 @@ WIDE static void stamp_sums(const float *v, long stride, long n, long rows, cons
  * Sums of I W, I W r^2, W^2 and first moments for W = exp(-r^2 / 2 w2), within
  * 4 sqrt(w2).  line: room for 5 (sides + LANES).
  */
-static void weighted_sums(const struct stamp *s, double cx, double cy, double w2, double *line, double out[5])
+static void weighted_sums(const struct stamp *s, double cx, double cy, const struct gauss *g, double *line, double out[5])
 {
-    double reach = 4 * sqrt(w2);
+    double reach = 4 * sqrt(g->w2);
     long x0 = cx - reach > 0 ? (long)ceil(cx - reach) : 0, y0 = cy - reach > 0 ? (long)ceil(cy - reach) : 0;
     long x1 = cx + reach < (double)(s->nx - 1) ? (long)floor(cx + reach) + 1 : s->nx;
     long y1 = cy + reach < (double)(s->ny - 1) ? (long)floor(cy + reach) + 1 : s->ny;
@@ -355,24 +372,26 @@ static void weighted_sums(const struct stamp *s, double cx, double cy, double w2
     if (x1 <= x0 || y1 <= y0)
         return;
     long n = x1 - x0, wide = (n + LANES - 1) / LANES * LANES, rows = y1 - y0;
-    double *wy = line + 3 * wide, sum[4], line2 = 0, rows2 = 0;
-    gaussian_line(cx - (double)x0, w2, n, line);
-    gaussian_line(cy - (double)y0, w2, rows, wy);
-    for (long i = 0; i < wide; i++) {      /* zeros beyond n: the stamp has room for LANES more */
-        double dx = (double)(x0 + i) - cx;
-        line[i] = i < n ? line[i] : 0;
-        line[wide + i] = line[i] * dx;
-        line[2 * wide + i] = line[i] * dx * dx;
-        line2 += line[i] * line[i];
+    double *wx = line, *dx = line + wide, *wy = line + 2 * wide, *dy = wy + rows, sum[4], line2 = 0, rows2 = 0;
+    gaussian_line(g, cx - (double)x0, n, wx);
+    gaussian_line(g, cy - (double)y0, rows, wy);
+    for (long i = n; i < wide; i++)        /* the stamp has room for LANES more */
+        wx[i] = 0;
+    for (long i = 0; i < wide; i++) {
+        dx[i] = (double)(x0 + i) - cx;
+        line2 += wx[i] * wx[i];
     }
-    for (long y = 0; y < rows; y++)
+    for (long y = 0; y < rows; y++) {
+        dy[y] = (double)(y0 + y) - cy;
         rows2 += wy[y] * wy[y];
-    stamp_sums(s->v + y0 * s->nx + x0, s->nx, wide, rows, line, wy, (double)y0 - cy, sum);
+    }
+    struct weights w = {wx, dx, wy, dy, wide, rows};
+    stamp_sums(s->v + y0 * s->nx + x0, s->nx, &w, sum);
     out[0] = sum[0];
-    out[1] = sum[3];
+    out[1] = sum[1];
     out[2] = line2 * rows2;
-    out[3] = sum[1];
-    out[4] = sum[2];
+    out[3] = sum[2];
+    out[4] = sum[3];
 }
 
 struct core {
@@ -390,7 +409,8 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
     double u_last = 0, f_last = 0;
     for (int i = 0; i < 50; i++) {
         double t[5];
-        weighted_sums(s, cx, cy, w2, line, t);
+        struct gauss g = gauss_of(w2);
+        weighted_sums(s, cx, cy, &g, line, t);
         if (!(t[0] > 0 && t[1] > 0))
             break;
         double m = 0.5 * t[1] / t[0];              /* per axis */
@@ -418,9 +438,10 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
 static void window_centroid(const struct stamp *s, double sigma, double *line, double *cx, double *cy)
 {
     double x = s->cx, y = s->cy;
+    struct gauss g = gauss_of(sigma * sigma);
     for (int i = 0; i < 16; i++) {
         double t[5];
-        weighted_sums(s, x, y, sigma * sigma, line, t);
+        weighted_sums(s, x, y, &g, line, t);
         if (!(t[0] > 0))
             return;
         double dx = 2 * t[3] / t[0], dy = 2 * t[4] / t[0];
@@ -469,8 +490,9 @@ static double measure_star(const struct field *f, const struct stamp *s, double 
     if (!(f->p->psf_fwhm > 0))
         return 0.5;
     double t0 = point_variance(f->p->psf_fwhm), w2 = 2.4 * t0 + 0.5, t[5], cx = s->cx, cy = s->cy;
+    struct gauss g = gauss_of(w2);
     window_centroid(s, sqrt(w2), line, &cx, &cy);
-    weighted_sums(s, cx, cy, w2, line, t);
+    weighted_sums(s, cx, cy, &g, line, t);
     if (!(t[0] > 0 && t[1] > 0))
         return 0;
     double ratio = 0.5 * t[1] / t[0] * (t0 + w2) / (t0 * w2);
