@@ -1,9 +1,10 @@
 /*
  * growth.c - radii of circles that hold given fluxes; see growth.h.
  *
- * One pass sums the pixels by rings of width 1 of their centres' distance.  The
- * ring in which the sum passes the flux gives a guess; only pixels of the rings
- * near it are cut exactly, in false-position steps.
+ * Pixels are summed by rings of width 1 of their centres' distance, as far out as
+ * needed.  The ring in which the sum passes the flux gives a guess; only pixels
+ * of the rings near it are cut exactly, in Newton steps: the overlap of a
+ * rectangle with a circle and its derivative come from one formula.
  */
 #include "growth.h"
 #include "grow.h"
@@ -12,21 +13,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NEAR = 2 };             /* rings on both sides of the guess */
-
-struct cut {                   /* a pixel near the circle */
-    double v, dx, dy;
-};
+enum { NEAR = 2, LANES = 8 };  /* NEAR: rings on both sides of the guess */
+enum { X0, Y0, X1, Y1, VALUE, SUM, SLOPE, PARTS };
 
 struct growth {
     const float *v;
-    long nx, rings, x0, x1, y0, y1;    /* pixels that are looked at */
+    long nx, ny, rings, known; /* rings as far as `reach`; how many of them are summed */
     double cx, cy, reach;
-    int32_t *ring;             /* of every pixel looked at */
+    int32_t *ring;             /* of the pixels of a row */
     double *sum;               /* by ring */
-    struct cut *cut;
+    double *cut;               /* PARTS arrays of `room` rectangles near the circle, in the first quadrant */
     size_t cap_ring, cap_sum, cap_cut;
-    long ncut;
+    long ncut, room;
 };
 
 int growth_new(struct growth **g)
@@ -102,120 +100,211 @@ WIDE static void rings_of(float dx, float dy, long n, int32_t *restrict ring)
 int growth_open(struct growth *g, const float *v, long nx, long ny, double cx, double cy, double reach)
 {
     long rings = (long)reach + 1;
-    double far = (double)rings;
-    g->x0 = cx > far ? (long)(cx - far) : 0;
-    g->y0 = cy > far ? (long)(cy - far) : 0;
-    g->x1 = cx + far + 1 < (double)nx ? (long)(cx + far) + 1 : nx;
-    g->y1 = cy + far + 1 < (double)ny ? (long)(cy + far) + 1 : ny;
-    long w = g->x1 - g->x0, h = g->y1 - g->y0;
-    int st = grow(&g->ring, &g->cap_ring, (size_t)(w > 0 && h > 0 ? w * h : 1), sizeof *g->ring);
+    int st = grow(&g->ring, &g->cap_ring, (size_t)nx, sizeof *g->ring);
     if (!st)                               /* the farthest pixel has a ring below 2 rings + 4 */
         st = grow(&g->sum, &g->cap_sum, (size_t)(2 * rings + 4), sizeof *g->sum);
     if (st)
         return st;
     g->v = v;
     g->nx = nx;
+    g->ny = ny;
     g->cx = cx;
     g->cy = cy;
     g->reach = reach;
     g->rings = rings;
-    memset(g->sum, 0, (size_t)(2 * rings + 4) * sizeof *g->sum);
-    for (long y = g->y0; y < g->y1; y++) {
-        int32_t *ring = g->ring + (y - g->y0) * w;
-        const float *row = v + y * nx + g->x0;
-        rings_of((float)((double)g->x0 - cx), (float)((double)y - cy), w, ring);
-        for (long i = 0; i < w; i++)
-            g->sum[ring[i]] += (double)row[i];
-    }
+    g->known = 0;
     return OK;
 }
 
-/* Collect the pixels of the rings k - NEAR .. k + NEAR; returns the flux of those inside. */
+/* The pixels a .. b-1 of n whose centres are within `far` of c. */
+static void span(double c, double far, long n, long *a, long *b)
+{
+    *a = c > far ? (long)(c - far) : 0;
+    *b = c + far + 1 < (double)n ? (long)(c + far) + 1 : n;
+}
+
+/* Sum the rings 0 .. known-1 (what is beyond them in sum[] is not complete). */
+static void sum_rings(struct growth *g, long known)
+{
+    long x0, x1, y0, y1;
+    span(g->cx, (double)known, g->nx, &x0, &x1);
+    span(g->cy, (double)known, g->ny, &y0, &y1);
+    g->known = known;
+    memset(g->sum, 0, (size_t)(2 * known + 4) * sizeof *g->sum);
+    for (long y = y0; y < y1 && x1 > x0; y++) {
+        const float *row = g->v + y * g->nx + x0;
+        rings_of((float)((double)x0 - g->cx), (float)((double)y - g->cy), x1 - x0, g->ring);
+        for (long i = 0; i < x1 - x0; i++)
+            g->sum[g->ring[i]] += (double)row[i];
+    }
+}
+
+static void add_rectangle(struct growth *g, double x0, double y0, double x1, double y1, double v)
+{
+    double *c = g->cut + g->ncut++;
+    c[X0 * g->room] = x0;
+    c[Y0 * g->room] = y0;
+    c[X1 * g->room] = x1;
+    c[Y1 * g->room] = y1;
+    c[VALUE * g->room] = v;
+}
+
+/* A pixel at (dx, dy); across an axis it is cut there, its parts turned into the first quadrant. */
+static void add_pixel(struct growth *g, double dx, double dy, double v)
+{
+    double x = fabs(dx) - 0.5, y = fabs(dy) - 0.5, near_x = x > 0 ? x : 0, near_y = y > 0 ? y : 0;
+    add_rectangle(g, near_x, near_y, x + 1, y + 1, v);
+    if (x < 0)
+        add_rectangle(g, 0, near_y, -x, y + 1, v);
+    if (y < 0)
+        add_rectangle(g, near_x, 0, x + 1, -y, v);
+    if (x < 0 && y < 0)
+        add_rectangle(g, 0, 0, -x, -y, v);
+}
+
+/* The pixels from .. to-1 of row y whose rings are first .. last. */
+static void collect_run(struct growth *g, long y, long from, long to, long first, long last)
+{
+    if (to <= from)
+        return;
+    double dy = (double)y - g->cy;
+    rings_of((float)((double)from - g->cx), (float)dy, to - from, g->ring);
+    for (long x = from; x < to; x++)
+        if (g->ring[x - from] >= first && g->ring[x - from] <= last)
+            add_pixel(g, (double)x - g->cx, dy, (double)g->v[y * g->nx + x]);
+}
+
+/* Collect the pixels of the rings k - NEAR .. k + NEAR; *inside: the flux of those within. */
 static int collect(struct growth *g, long k, double *inside)
 {
-    long w = g->x1 - g->x0, first = k > NEAR ? k - NEAR : 0, last = k + NEAR;
-    double far = (double)last + 2;
-    long a = g->cx - far > (double)g->x0 ? (long)(g->cx - far) : g->x0;
-    long b = g->cx + far < (double)g->x1 ? (long)(g->cx + far) : g->x1;
-    long c = g->cy - far > (double)g->y0 ? (long)(g->cy - far) : g->y0;
-    long d = g->cy + far < (double)g->y1 ? (long)(g->cy + far) : g->y1;
+    long first = k > NEAR ? k - NEAR : 0, last = k + NEAR, a, b, c, d;
+    span(g->cx, (double)last + 2, g->nx, &a, &b);
+    span(g->cy, (double)last + 2, g->ny, &c, &d);
     *inside = 0;
     for (long j = 0; j < first; j++)
         *inside += g->sum[j];
     g->ncut = 0;
-    if (b <= a || d <= c)
-        return OK;
-    int st = grow(&g->cut, &g->cap_cut, (size_t)((b - a) * (d - c)), sizeof *g->cut);
+    /* at most the pixels of the box, and four parts of those across an axis */
+    size_t room = b > a && d > c ? (size_t)((b - a) * (d - c) + 2 * (b - a) + 2 * (d - c) + 16) : 16;
+    int st = grow(&g->cut, &g->cap_cut, PARTS * room, sizeof *g->cut);
     if (st)
         return st;
-    for (long y = c; y < d; y++) {
-        const int32_t *ring = g->ring + (y - g->y0) * w - g->x0;
-        const float *row = g->v + y * g->nx;
-        for (long x = a; x < b; x++) {
-            g->cut[g->ncut] = (struct cut){(double)row[x], (double)x - g->cx, (double)y - g->cy};
-            g->ncut += ring[x] >= first && ring[x] <= last;
+    g->room = (long)room;
+    for (long y = c; y < d && b > a; y++) {
+        double dy = (double)y - g->cy, in2 = (double)(first * first) - dy * dy, in = in2 > 4 ? sqrt(in2) - 1 : 0;
+        long left = b, right = b;          /* what lies between is nearer than ring `first` */
+        if (in > 0) {
+            left = (long)floor(g->cx - in) + 1;
+            right = (long)floor(g->cx + in);
+            left = left < a ? a : left < b ? left : b;
+            right = right < left ? left : right < b ? right : b;
         }
+        collect_run(g, y, a, left, first, last);
+        collect_run(g, y, right, b, first, last);
     }
+    while (g->ncut % LANES)
+        add_rectangle(g, 1, 1, 1, 1, 0);
     return OK;
 }
 
-/* Flux inside radius r, from the pixels collected. */
-static double flux_within(const struct growth *g, double inside, double r)
+/*
+ * Overlap of n rectangles with the circle of radius r, times their values, into
+ * sum[], and twice its derivative by r^2, into slope[].  c: arrays X0 to VALUE,
+ * `room` apart.  The arc of angle u between the points at a and b has sin(u/2)^2 = z <= 1/2;
+ * the polynomial is asin(sqrt z)/sqrt z within 4e-10 (Chebyshev).
+ */
+WIDE static void overlaps(const double *restrict c, long room, long n, double r, double *restrict sum,
+                          double *restrict slope)
 {
-    double sum = inside;
-    for (long i = 0; i < g->ncut; i++)
-        sum += g->cut[i].v * circle_overlap(g->cut[i].dx, g->cut[i].dy, r);
+    const double *x0 = c, *y0 = c + Y0 * room, *x1 = c + X1 * room, *y1 = c + Y1 * room, *v = c + VALUE * room;
+    double r2 = r * r, quarter = 0.25 / r2;
+    for (long i = 0; i < n; i++) {
+        double a = r2 - y1[i] * y1[i], b = r2 - y0[i] * y0[i];
+        a = sqrt(a > 0 ? a : 0);
+        b = sqrt(b > 0 ? b : 0);
+        a = a > x0[i] ? a : x0[i];
+        a = a < x1[i] ? a : x1[i];
+        b = b < x1[i] ? b : x1[i];
+        b = b > a ? b : a;
+        double ha = r2 - a * a, hb = r2 - b * b;
+        ha = sqrt(ha > 0 ? ha : 0);
+        hb = sqrt(hb > 0 ? hb : 0);
+        double dh = ha - hb, z = ((b - a) * (b - a) + dh * dh) * quarter;
+        z = b > a ? z : 0;
+        z = z < 0.5 ? z : 0.5;
+        double p = 0.9999999997208244 + z * (0.1666667753383435 + z * (0.07499305723602248 + z * (0.0448136838643679 +
+                   z * (0.02826846168768248 + z * (0.03717695363414592 + z * (-0.04439638506191897 + z *
+                   (0.1674860232289666 + z * (-0.2027115864671941 + z * 0.1463625823269831))))))));
+        double u = 2 * sqrt(z) * p;
+        double area = (a - x0[i]) * (y1[i] - y0[i]) + 0.5 * (b * hb - a * ha + r2 * u) - y0[i] * (b - a);
+        sum[i] = v[i] * area;
+        slope[i] = v[i] * u;
+    }
+}
+
+/* Flux inside radius r > 0, from the pixels collected; *slope: its derivative by r^2. */
+static double flux_within(const struct growth *g, double inside, double r, double *slope)
+{
+    double sum = inside, s = 0;
+    double *to = g->cut + SUM * g->room, *slopes = g->cut + SLOPE * g->room;
+    overlaps(g->cut, g->room, g->ncut, r, to, slopes);
+    double lane[2][LANES] = {{0}};
+    for (long i = 0; i < g->ncut; i += LANES)
+        for (int j = 0; j < LANES; j++) {
+            lane[0][j] += to[i + j];
+            lane[1][j] += slopes[i + j];
+        }
+    for (int j = 0; j < LANES; j++) {
+        sum += lane[0][j];
+        s += lane[1][j];
+    }
+    *slope = 0.5 * s;
     return sum;
 }
 
-/* Root of flux_within = flux by false position in r^2 (Illinois rule), between lo and hi; slope: flux per r^2. */
-static double solve(const struct growth *g, double inside, double flux, double lo, double hi, double guess,
-                    double slope)
+/* Root of flux_within = flux between lo and hi by Newton steps in r^2, halving where they leave the bracket. */
+static double solve(const struct growth *g, double inside, double flux, double lo, double hi, double guess)
 {
-    double f_lo = 0, f_hi = 0, r = guess;
-    int known_lo = 0, known_hi = 0, last = 0;
+    double r = guess;
     for (int i = 0; i < 40; i++) {
-        double here = flux_within(g, inside, r) - flux;
-        if (fabs(here) < 5e-4 * flux || !(hi - lo > 2e-4 * hi))
-            return r;
-        if (here >= 0) {
+        double slope, here = flux_within(g, inside, r, &slope) - flux, next = r * r - here / slope;
+        if (here >= 0)
             hi = r;
-            f_hi = here;
-            f_lo *= last == 1 ? 0.5 : 1;
-            known_hi = 1;
-            last = 1;
-        } else {
+        else
             lo = r;
-            f_lo = here;
-            f_hi *= last == -1 ? 0.5 : 1;
-            known_lo = 1;
-            last = -1;
-        }
-        double next = known_lo && known_hi ? lo * lo - f_lo / (f_hi - f_lo) * (hi * hi - lo * lo) : r * r - here / slope;
-        next = next > 0 ? sqrt(next) : 0;
-        r = next > lo && next < hi ? next : 0.5 * (lo + hi);
+        next = slope > 0 && next > 0 ? sqrt(next) : -1;
+        int good = next >= lo && next <= hi;
+        if (fabs(here) < 5e-4 * flux || !(hi - lo > 2e-4 * hi))
+            return good ? next : r;
+        r = good ? next : 0.5 * (lo + hi);
     }
     return r;
 }
 
 int growth_radius(struct growth *g, double flux, double *radius)
 {
-    double sum = 0;
+    double sum = 0, inside, slope;
     long k = 0;
-    for (; k < g->rings && sum + g->sum[k] < flux; k++)
+    for (;; k++) {
+        if (k >= g->known && g->known < g->rings) {
+            long more = g->known ? 2 * g->known : g->rings / 2 + 1;
+            sum_rings(g, more < g->rings ? more : g->rings);
+        }
+        if (k >= g->rings || !(sum + g->sum[k] < flux))
+            break;
         sum += g->sum[k];
+    }
     *radius = g->reach;
-    double inside;
     int st = collect(g, k, &inside);
     if (st)
         return st;
     double most = (double)(k + NEAR), hi = most < g->reach ? most : g->reach;
-    if (k == g->rings && flux_within(g, inside, hi) < flux)
+    if (k == g->rings && flux_within(g, inside, hi, &slope) < flux)
         return OK;
     double lo = k > NEAR ? (double)(k - NEAR + 1) : 0;
     double guess = k < g->rings ? sqrt((double)(k * k) + (2.0 * (double)k + 1) * (flux - sum) / g->sum[k]) : hi;
     guess = guess < hi ? guess : hi;
     guess = guess > lo ? guess : 0.5 * (lo + hi);
-    *radius = solve(g, inside, flux, lo, hi, guess, g->sum[k] / (2.0 * (double)k + 1));
+    *radius = solve(g, inside, flux, lo, hi, guess);
     return OK;
 }

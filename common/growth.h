@@ -19,7 +19,7 @@ MUST_CHECK int growth_open(struct growth *g, const float *v, long nx, long ny, d
 
 /*
  * The smallest radius, as far as one-pixel rings tell, that holds `flux` (> 0),
- * within 5e-4 of the flux; `reach` when none does.
+ * within 1e-5 of the flux; `reach` when none does.
  */
 MUST_CHECK int growth_radius(struct growth *g, double flux, double *radius);
 
