@@ -180,6 +180,16 @@ static void write_text(const struct common *c, size_t n, const struct fom_result
         die(EXIT_RUN, "%s", e.text);
 }
 
+/* A reference that is asked for must be there. */
+static void check_reference(const struct fom_options *o, size_t n, const struct fom_result *r)
+{
+    size_t i = 0;
+    while (i < n && o->ref_set && strcmp(r[i].set, o->ref_set) != 0)
+        i++;
+    if (n > 0 && o->ref_set && i == n)
+        die(EXIT_RUN, "--reference-set %s: no catalogue has this SETNAME (the first has %s)", o->ref_set, r[0].set);
+}
+
 int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
@@ -215,6 +225,7 @@ int main(int argc, char **argv)
     if (!r)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
     size_t groups = group_all(n, im, &bins, &o, r);
+    check_reference(&o, groups, r);
     check(fom_compare(groups, r, &o), "lines over scales");
     check(fom_optimum(groups, r, &o), "best scale");
     if (c.check) {

@@ -102,6 +102,16 @@ near "no survivor: n_gal 0" "$(col none.cat N_GAL)" 0 0
 fom few0 few1 --table -q >few.txt; grep -q undefined few.txt && pass "undefined in the table" || fail "no undefined in $(cat few.txt)"
 sed 's/ 0.05 / nan /' a4 >nan4; ok "rows without an error" fom a0 nan4 -o nan.cat
 fails "no operand reads standard input, here empty" 1 fom
+fails "--reference-set that no catalogue has" 1 fom a0 a1 --reference-set nosuch -o nosuch.cat
+if [ -e nosuch.cat ]; then fail "it left an output"; else pass "and no output"; fi
+ok "a reference scale that is not there: undefined, with a warning" fom a0 a1 --reference-set sim1 --reference-scale 0.3 -o noscale.cat
+grep -q LOGDC cmd.err && near "LOGDC is nan" "$(col noscale.cat LOGDC | grep -c nan)" 1 0 || fail "no warning names LOGDC: $(cat cmd.err)"
+awk '/^#/ { print; next } { $4 = 0.1; $5 = 0.1; print }' a0 >flat0; ok "zero variance" fom flat0 -o flat.cat
+near "zero variance: no kurtosis" "$(col flat.cat KURT1 | grep -c nan)" 1 0
+grep -q undefined cmd.err && pass "zero variance: a warning" || fail "zero variance: no warning"
+for k in 1 2; do sed 's/SHEAR1 = .*/SHEAR1 = 0.05/' a1 >equal$k; done; ok "all-equal shears" fom equal1 equal2 -o equal.cat
+near "all-equal shears: no slope" "$(paste <(col equal.cat B1) <(col equal.cat BPAIR1) | grep -c 'nan.*nan')" 1 0
+grep -q 'undefined.*B1' cmd.err && pass "all-equal shears: a warning" || fail "all-equal shears: no warning"
 fails "no such file" 1 fom a0 nothere
 grep -v SHEAR1 a0 >nog; fails "no SHEAR1" 1 fom nog
 sed 's/ P11 / P99 /' a0 >nop; fails "no response column" 1 fom nop

@@ -265,6 +265,41 @@ static void mirrored(void)
     check_end(&c);
 }
 
+/* Bins: each has the objects between its edges, and nothing else. */
+static void bins(void)
+{
+    struct world w = {.n = 800, .m = 0, .sigma = 0.25, .noise = 0.1, .seed = 56};
+    struct fom_image im[2] = {image(&w, shears[1], 0.1, "f", 0), image(&w, shears[4], 0.1, "f", 0)};
+    const struct fom_image *p[2] = {&im[0], &im[1]};
+    struct fom_result all = {0}, r[3] = {{.lo = 0}};
+    const double edge[4] = {0, 1, 3, 4};          /* keys are 0 1 2 3, 200 objects each; the one key that is nan is in no bin */
+    im[0].object[4].key = im[1].object[4].key = NAN;
+    struct check c = check_begin("three bins of 200, 400, 200 objects less one without a key: counts and densities");
+    check_close(&c, fom_group(2, p, &standard, &all), OK, 0.1);
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < 2; i++)
+            fom_image_bin(&im[i], edge[k], edge[k + 1]);
+        check_close(&c, fom_group(2, p, &standard, &r[k]), OK, 0.1);
+        check_close(&c, (double)fom_image_used(&im[0]), k == 0 ? 199 : k == 1 ? 400 : 200, 0.1);
+        check_close(&c, r[k].v[FOM_PAIRS1], k == 0 ? 199 : k == 1 ? 400 : 200, 0.1);
+        check_close(&c, r[k].v[FOM_BP1], 1, 1e-12);
+        check_close(&c, r[k].v[FOM_N_GAL], (k == 0 ? 199 : k == 1 ? 400 : 200) / 4.0, 1e-9);
+    }
+    check_close(&c, all.v[FOM_PAIRS1], 800, 0.1);
+    double mean = 0;
+    for (int k = 0; k < 3; k++)
+        mean += r[k].v[FOM_G] * r[k].v[FOM_PAIRS1] / 799;
+    check_close(&c, mean, all.v[FOM_G], 5e-3);
+    check_end(&c);
+    fom_image_bin(&im[0], 10, 20);
+    check_that(fom_image_used(&im[0]) == 0, "a bin beyond all: nothing");
+    fom_result_free(&all);
+    for (int k = 0; k < 3; k++)
+        fom_result_free(&r[k]);
+    for (int i = 0; i < 2; i++)
+        fom_image_free(&im[i]);
+}
+
 static void undefined(void)
 {
     struct world w = {.n = 3, .sigma = 0.25, .seed = 54};
@@ -277,6 +312,22 @@ static void undefined(void)
     w = (struct world){.n = 500, .sigma = 0, .seed = 55};
     r = measure(&w, 0.1, 1, &standard);
     check_that(isfinite(r.v[FOM_G]) && isfinite(r.v[FOM_BP1]) && isfinite(r.v[FOM_B1]), "no intrinsic ellipticity: slopes are defined");
+    struct fom_image low = image(&w, shears[4], 0.1, "f", 0);
+    const struct fom_image *only[1] = {&low};
+    for (size_t i = 0; i < low.n; i++)
+        low.object[i].p[0] = low.object[i].p[1] = 0.2;
+    int st = fom_group(1, only, &standard, &r);
+    check_that(st == OK && isnan(r.v[FOM_G]) && isnan(r.v[FOM_SIGMA1]) && isnan(r.v[FOM_B1]), "a mean response of 0.2: refused, no shear");
+    fom_result_free(&r);
+    for (size_t i = 0; i < low.n; i++) {
+        low.object[i].p[0] = low.object[i].p[1] = 1.3;
+        low.object[i].e[0] = low.object[i].e[1] = 0.1;
+    }
+    st = fom_group(1, only, &standard, &r);
+    check_that(st == OK && isfinite(r.v[FOM_G]) && r.v[FOM_SIGMA1] == 0 && isnan(r.v[FOM_SKEW1]) && isnan(r.v[FOM_KURT1]) && isnan(r.v[FOM_KURT1ERR]),
+               "zero variance: no skewness, no kurtosis");
+    fom_result_free(&r);
+    fom_image_free(&low);
     struct fom_image im = image(&w, shears[0], 0.1, "f", 0);
     const struct fom_image *one[2] = {&im, &im};
     check_that(fom_group(2, one, &standard, &r) == OK && isnan(r.v[FOM_B1]) && isnan(r.v[FOM_BP1]), "all-equal shears: no slope");
@@ -291,6 +342,7 @@ int main(void)
     selection();
     fields_and_lines();
     mirrored();
+    bins();
     undefined();
     return check_status();
 }
