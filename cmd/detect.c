@@ -457,6 +457,8 @@ int main(int argc, char **argv)
          .help = "side of the background cells, pixels"},
         {.name = "back-filter", .type = OPT_LONG, .value = &o.p.back_filter, .lo = 1, .hi = 101, .arg = "N",
          .help = "median filter over N x N cells, odd"},
+        {.name = "back-type", .type = OPT_CHOICE, .value = &o.p.dark_sky, .choices = "mode|dark", .arg = "TYPE",
+         .help = "level of a cell: 2.5 median - 1.5 mean, or the mean of its dark part"},
         {.name = "rms", .type = OPT_REAL, .value = &o.p.rms, .lo = 0, .hi = 1e30, .arg = "R",
          .help = "noise of a pixel, unit of the image (default: measured)"},
         {.name = "weight", .letter = 'w', .type = OPT_STR, .value = &o.weight, .arg = "FILE", .in_file = 1,

@@ -248,7 +248,7 @@ struct cells {
     long mx, my;
     double *level, *sigma;         /* my*mx; NaN: no use */
     long *bad;                     /* my: bad pixels of a row of cells */
-    struct darksky *dark;
+    struct darksky *dark;          /* NULL: not asked for */
 };
 
 WIDE static int all_finite(const float *v, long n)
@@ -283,6 +283,7 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
     (void)worker;
     const struct cells *c = ctx;
     long nx = c->im->nx, ny = c->im->ny;
+    double gain = c->dark ? c->p->gain : 0;
     size_t room = (size_t)(nx / c->mx + 1) * (size_t)(ny / c->my + 1);
     float *buf = malloc(room * sizeof *buf);
     if (!buf)
@@ -296,11 +297,12 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
             c->level[at] = c->sigma[at] = NAN;
             c->bad[j] -= n;
             if (n > 0 && n * 4 >= (x1 - x0) * (y1 - y0))
-                background_clip(buf, n, c->p->gain, c->p->removed, &c->level[at], &c->sigma[at]);
+                background_clip(buf, n, gain, c->p->removed, &c->level[at], &c->sigma[at]);
             else if (n > 0 && c->mx * c->my == 1)
-                background_clip(buf, n, c->p->gain, c->p->removed, &c->level[at], &c->sigma[at]);
+                background_clip(buf, n, gain, c->p->removed, &c->level[at], &c->sigma[at]);
         }
-        darksky_rows(c->dark, c->im, c->rms_map, y0, y1);
+        if (c->dark)
+            darksky_rows(c->dark, c->im, c->rms_map, y0, y1);
     }
     free(buf);
     return OK;
@@ -364,19 +366,27 @@ static int fill_bad(double *level, double *sigma, long mx, long my)
     return OK;
 }
 
-/* Median over side x side cells (cut at the border) from v into out. */
+static long least(long a, long b, long c)
+{
+    long m = a < b ? a : b;
+    return m < c ? m : c;
+}
+
+/*
+ * Median over side x side cells from v into out.  At the border the window
+ * shrinks on both sides alike, so that a slope stays what it is.
+ */
 static int median_filter(const double *v, long mx, long my, long side, double *out)
 {
-    long r = side / 2;
-    long w = 2 * r + 1 < mx ? 2 * r + 1 : mx, hgt = 2 * r + 1 < my ? 2 * r + 1 : my;
-    double *box = malloc((size_t)w * (size_t)hgt * sizeof *box);
+    long r = side / 2, w = least(side, mx, mx), h = least(side, my, my);
+    double *box = malloc((size_t)w * (size_t)h * sizeof *box);
     if (!box)
         return E_NOMEM;
     for (long j = 0; j < my; j++)
         for (long i = 0; i < mx; i++) {
-            long n = 0;
-            for (long b = j > r ? j - r : 0; b <= j + r && b < my; b++)
-                for (long a = i > r ? i - r : 0; a <= i + r && a < mx; a++)
+            long n = 0, ri = least(r, i, mx - 1 - i), rj = least(r, j, my - 1 - j);
+            for (long b = j - rj; b <= j + rj; b++)
+                for (long a = i - ri; a <= i + ri; a++)
                     box[n++] = v[b * mx + a];
             out[j * mx + i] = background_median(box, n);
         }
@@ -702,11 +712,11 @@ int background_measure(struct background *b, const struct image *im, const float
     }
     c.sigma = c.level + n;
     struct darksky dark = {0};
-    c.dark = &dark;
-    int st = darksky_new(&dark, im);
+    c.dark = p->dark ? &dark : NULL;
+    int st = p->dark ? darksky_new(&dark, im) : OK;
     if (!st)
         st = par_for(c.my, 1, p->threads, measure_rows, &c);
-    if (!st)
+    if (!st && p->dark)
         st = par_for(c.my, 1, p->threads, darken_rows, &c);
     darksky_free(&dark);
     if (!st) {

@@ -4,9 +4,10 @@
  * The image is divided into mx x my cells of nearly `cell` pixels.  In each the
  * level is 2.5 median - 1.5 mean of the pixels left by iterated clipping at
  * 3 sigma about the median, or the median where the two differ by more than
- * 0.3 sigma (crowded); cells without enough good pixels take their neighbours'
- * mean, a median filter removes cells that an object fills, and a natural
- * bicubic spline joins the cell centres (linear beyond the outermost).
+ * 0.3 sigma (crowded), or the mean of the dark part of the cell (darksky.h);
+ * cells without enough good pixels take their neighbours' mean, a median filter
+ * (its window shrinks at the border) removes cells that an object fills, and a
+ * natural bicubic spline joins the cell centres (linear beyond the outermost).
  */
 #ifndef PIXSHEAR_BACKGROUND_H
 #define PIXSHEAR_BACKGROUND_H
@@ -34,10 +35,12 @@ struct background {
 struct background_params {
     long cell;             /* wanted side of a cell, pixels, >= 4 */
     long filter;           /* side of the median filter, cells, odd, 1: none */
-    double gain;           /* electrons per unit of the image, 0 unknown: the median of photon noise
-                              lies 1/6 electron below its mean and is moved there */
+    double gain;           /* for `dark`: electrons per unit of the image, 0 unknown: the median of photon
+                              noise lies 1/6 electron below its mean and is moved there */
     double removed;        /* sky already subtracted from the image, in its unit: its photon noise is still there */
     int threads;
+    int dark;              /* mean of the dark part of each cell, else Source Extractor's mode, which lies
+                              2.5/6 electron below the mean of photon noise */
 };
 
 /*

@@ -292,7 +292,7 @@ static int measure_all(const struct image *im, const float *map, const struct de
         return E_NOMEM;
     struct measuring t = {{im, &d->background, &d->label, &phot, 0}, all, d, p->progress, DETECT_STEPS / 2};
     if (p->measure) {
-        struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads};
+        struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads, p->dark_sky};
         int st = background_measure(&d->measured, p->measure, NULL, &bp);
         if (st)
             return st;
@@ -307,7 +307,7 @@ static int measure_all(const struct image *im, const float *map, const struct de
 static int prepare(const struct image *im, float *map, int relative, const struct detect_params *p,
                    struct detection *d)
 {
-    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, p->threads};
+    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, p->threads, p->dark_sky};
     int st = background_measure(&d->background, im, map, &bp);
     if (st)
         return st;

@@ -29,6 +29,7 @@ struct detect_params {
     int pixel_noise;           /* of the pixels instead of the filtered image */
     long min_area;             /* pixels */
     long back_cell, back_filter;
+    int dark_sky;              /* sky between the objects instead of the mode */
     double sky_removed;        /* sky already subtracted from the image, its unit */
     double rms;                /* noise per pixel when known, 0: measure */
     long levels;               /* deblending */

@@ -2,7 +2,7 @@
 # at 0.10 arcsec: galaxy density, noise-free slopes, shared noise, same bytes.
 x=0.10 n=1638
 common="-x $x --size $n,$n -T 2000 --accuracy 1e-6 --floor 0.085 --set sim1"
-found="--threshold 1.5 --threshold-noise pixel --min-area 5"
+found="--threshold 1.5 --threshold-noise pixel --min-area 5 --back-type dark"
 psfgen -o psf.fits
 galgen --models models.txt -o scene.txt
 galgen --stars -s 501 | simage - -p psf.fits $common | addnoise --depth 27.7 -s 501 -o stars.fits

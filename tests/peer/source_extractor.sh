@@ -38,38 +38,43 @@ near "FLUX_RADIUS" "$(awk '$11 == 0 && $24 == 0 { print $22 / $9 }' pairs.txt | 
 near "threshold" "$(awk '{ print $26 / $13 }' pairs.txt | head -1)" 1 0.01
 near "background, units of 17 electrons rms" "$(awk '{ print ($25 - $12) / 17 }' pairs.txt | med)" 0 0.04
 
-# both against the scene: matched (within 0.3", at least 2 px, and 2 mag), purity, and brighter than 25.5 the median position error, magnitude bias and its median deviation
+# Both against the scene as compare_detect.py does it: pairs nearer than 0.3" in order of distance, each object once, then those within
+# 2 mag.  Prints matched, purity; brighter than 25.5 the median position error, magnitude bias and its median deviation; completeness to 26.
 score() {
-    awk -v n=$N -v s=$SCALE '/^#/ { if (FNR == NR && $2 !~ /^[0-9]/) for (i = 2; i <= NF; i++) h[$i] = i - 1; next }
-        FNR == NR { x[++t] = $h["DX"] / s + (n + 1) / 2; y[t] = $h["DY"] / s + (n + 1) / 2; m[t] = $h["MAG"]; g = int(x[t] / 8) "," int(y[t] / 8); c[g] = c[g] " " t; next }
-        $2 < 10 || $3 < 10 || $2 > n - 9 || $3 > n - 9 { next }
-        { all++; best = (0.3 / s > 2 ? 0.3 / s : 2)^2; hit = 0; u = int($2 / 8); v = int($3 / 8)
+    awk -v n=$N -v s=$SCALE -v weights="${WEIGHTS:-0}" '
+        function in_field(x, y) { return x > 10 && y > 10 && x < n - 9 && y < n - 9 && !(weights && dead(x, y)) }
+        function dead(x, y) { return x > n / 2 - 2 && x < n / 2 + 8 || x < n / 12 + 4 && y > n / 2 - 2 && y < n * 5 / 8 + 4 }
+        /^#/ { if (FNR == NR && $2 !~ /^[0-9]/) for (i = 2; i <= NF; i++) h[$i] = i - 1; next }
+        FNR == NR { px = $h["DX"] / s + (n + 1) / 2; py = $h["DY"] / s + (n + 1) / 2
+            if (in_field(px, py)) { x[++t] = px; y[t] = py; g = int(px / 8) "," int(py / 8); c[g] = c[g] " " t; print "0 T", t, $h["MAG"] }; next }
+        !in_field($2, $3) { next }
+        { print "0 O", ++all, $6; u = int($2 / 8); v = int($3 / 8)
           for (p = u - 1; p <= u + 1; p++) for (q = v - 1; q <= v + 1; q++) { k = split(c[p "," q], w, " ")
-            for (i = 1; i <= k; i++) { d = ($2 - x[w[i]])^2 + ($3 - y[w[i]])^2; dm = $6 - m[w[i]]
-                if (!(w[i] in used) && d < best && dm < 2 && dm > -2) { best = d; hit = w[i] } } }
-          if (hit) { used[hit] = 1; ok++; if (m[hit] < 25.5) { pos[++b] = sqrt(best); mag[b] = $6 - m[hit] } } }
+            for (i = 1; i <= k; i++) { d = sqrt(($2 - x[w[i]])^2 + ($3 - y[w[i]])^2); if (d * s < 0.3) printf "%.9g P %d %d\n", d, w[i], all } } }' scene.txt "$1" |
+    LC_ALL=C sort -g | awk '
+        $2 == "T" { m[$3] = $4; if ($4 < 26) deep++ }
+        $2 == "O" { mine[$3] = $4; all++ }
+        $2 == "P" && !($3 in ut) && !($4 in uo) { ut[$3] = uo[$4] = 1; dm = mine[$4] - m[$3]
+            if (dm < 2 && dm > -2) { ok++; if (m[$3] < 26) seen++; if (m[$3] < 25.5) { pos[++b] = $1; mag[b] = dm } } }
         function middle(a, k,  i, j, v) { for (i = 2; i <= k; i++) { v = a[i]; for (j = i - 1; j > 0 && a[j] > v; j--) a[j + 1] = a[j]; a[j + 1] = v } return a[int((k + 1) / 2)] }
         END { bias = middle(mag, b); for (i = 1; i <= b; i++) { d = mag[i] - bias; dev[i] = d < 0 ? -d : d }
-            print ok, ok / all, middle(pos, b), bias, middle(dev, b) }' scene.txt "$1"
+            print ok, ok / all, middle(pos, b), bias, middle(dev, b), seen / deep }'
 }
-read -r ms ps ds bs ss < <(score sex.cat)
-read -r mm pm dm bm sm < <(score mine.cat)
+read -r ms ps ds bs ss cs < <(score sex.cat)
+read -r mm pm dm bm sm cm < <(score mine.cat)
 echo "# at 1.5 sigma both: Source Extractor matched $ms purity $ps position $ds px bias $bs mag; detect $mm $pm $dm $bm"
 between "matched, over Source Extractor's, at the same settings" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.99 1.2
 between "purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.005 0.1
-between "magnitude bias less Source Extractor's" "$(awk -v a="$bm" -v b="$bs" 'BEGIN { print a - b }')" -0.05 0.005
-# the skies differ (photon noise moves Source Extractor's mode by 0.42 electron, faint light the other way): score at the same level in electrons
+between "completeness to 26 less Source Extractor's" "$(awk -v a="$cm" -v b="$cs" 'BEGIN { print a - b }')" -0.005 0.1
+between "magnitude bias less Source Extractor's" "$(awk -v a="$bm" -v b="$bs" 'BEGIN { print a - b }')" -0.05 0.002
+# the same level in electrons needs the same threshold
 k=$(awk '{ print 1.5 * (1 + ($12 - $25) / $26) * $13 / $26 }' pairs.txt | med)
-between "threshold that gives the same level" "$k" 1.45 1.6
-detect field.fits --kernel 0.15 --threshold "$k" --threshold-noise pixel --min-area 5 --columns NUMBER,X_IMAGE,Y_IMAGE,FLUX_AUTO,FLUXERR_AUTO,MAG_AUTO -o level.cat
-read -r mm pm dm bm sm < <(score level.cat)
-echo "# Source Extractor: matched $ms purity $ps position $ds px bias $bs mag; detect: $mm $pm $dm $bm"
-between "matched, over Source Extractor's" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.99 1.2
-between "purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.005 0.1
+between "threshold that gives the same level" "$k" 1.45 1.5
 between "position error over Source Extractor's" "$(awk -v a="$dm" -v b="$ds" 'BEGIN { print a / b }')" 0.5 1.02
-between "magnitude bias less Source Extractor's" "$(awk -v a="$bm" -v b="$bs" 'BEGIN { print a - b }')" -0.05 0.01
 
-# four more fields, stars and galaxies, two of them with a rising sky, dead columns, a dead box and a third at half exposure
+# Four more fields, stars and galaxies, three of them with a rising sky, two with dead columns, a dead box and a third at half
+# exposure.  Read noise makes the values real numbers: on whole ones Source Extractor's histogram puts the sky of 46 electrons
+# 0.3 further off.  Within 3 pixels of a dead one nothing is scored (Source Extractor interpolates there and finds the results).
 field() { # NAME SEED SCALE SIZE SLOPE EXPOSURE
     local name=$1 seed=$2 scale=$3 n=$4 f
     f=$(awk "BEGIN { print $n * $scale }")
@@ -77,47 +82,44 @@ field() { # NAME SEED SCALE SIZE SLOPE EXPOSURE
     galgen --stars -n 25 --field "$f" -s "$((seed + 100))" -o t.txt
     { cat g.txt; awk '!/^#/ { print $1 + 900000, $2, $3, 20.5 + 0.2 * NR, "star", 0, 0, 0, 0, 0 }' t.txt; } >scene.txt
     simage scene.txt --models gm.txt -p psf.fits -x "$scale" --size "$n,$n" --accuracy 1e-3 -o clean.fits
-    addnoise -q --depth 27.7 -s "$seed" clean.fits -o noisy.fits
+    addnoise -q --depth 27.7 --read-noise 3 -s "$seed" clean.fits -o noisy.fits
     "${BUILD:-$TOP/build}/tool/spoil" noisy.fits field.fits weight.fits "$seed" "$5" "$6"
-    local zp clean weights=() mine=()
+    local zp weights=() mine=() w=0
     zp=$(card field.fits MAGZERO)
-    if [ "$6" != 1 ]; then weights=(-WEIGHT_TYPE MAP_WEIGHT -WEIGHT_IMAGE weight.fits); mine=(-w weight.fits); fi
+    if [ "$6" != 1 ]; then w=1 weights=(-WEIGHT_TYPE MAP_WEIGHT -WEIGHT_IMAGE weight.fits); mine=(-w weight.fits); fi
     awk -v f="$(awk "BEGIN { print 0.15 / $scale }")" 'BEGIN { print "CONV NORM"; s = f / 2.35482; r = int(3 * s) + 1
         for (j = -r; j <= r; j++) { for (i = -r; i <= r; i++) printf "%.6f ", exp(-(i * i + j * j) / (2 * s * s)); print "" } }' >k.conv
     "$sex" field.fits -c empty.sex -CATALOG_NAME sex.cat -CATALOG_TYPE ASCII_HEAD -PARAMETERS_NAME p.param -FILTER Y -FILTER_NAME k.conv \
         -DETECT_MINAREA 5 -DETECT_THRESH 1.5 -ANALYSIS_THRESH 1.5 -MAG_ZEROPOINT "$zp" -GAIN 1 -GAIN_KEY NONE -SATUR_LEVEL 1e9 -SATUR_KEY NONE \
         -BACK_SIZE 64 -BACK_FILTERSIZE 3 -PIXEL_SCALE 0 -VERBOSE_TYPE QUIET "${weights[@]}" 2>sex.err
-    mine+=(-q field.fits --kernel 0.15 --threshold-noise pixel --min-area 5 --columns NUMBER,X_IMAGE,Y_IMAGE,FLUX_AUTO,FLUXERR_AUTO,MAG_AUTO,BACKGROUND,THRESHOLD)
-    detect "${mine[@]}" --threshold 1.5 -o mine.cat
-    read -r ms ps ds bs ss < <(N=$n SCALE=$scale score sex.cat)
-    read -r mm pm dm bm sm < <(N=$n SCALE=$scale score mine.cat)
-    echo "# $name, 1.5 sigma both: Source Extractor: matched $ms purity $ps position $ds px bias $bs scatter $ss; detect: $mm $pm $dm $bm $sm"
-    local column sky level k
-    column() { grep -v '^#' "$1" | awk "{ print $2 }" | med; }
-    sky=$(column mine.cat '$7') level=$(column mine.cat '$8')
-    k=$(awk "BEGIN { print 1.5 * ($(column sex.cat '$12 + $13') - $sky) / $level }")
-    [ "$5$6" != 01 ] || { clean=$(card field.fits SKYLEVEL)
-        between "$name: error of the sky, and of Source Extractor's, in electrons: $(awk "BEGIN { print $sky - $clean, $(column sex.cat '$12') - $clean }"); ratio" \
-            "$(awk "BEGIN { a = $sky - $clean; b = $(column sex.cat '$12') - $clean; print sqrt(a * a / (b * b)) }")" 0 0.9; }
-    detect "${mine[@]}" --threshold "$k" -o mine.cat
-    read -r mm pm dm bm sm < <(N=$n SCALE=$scale score mine.cat)
-    echo "# $name, same level in electrons (here $k sigma): detect: $mm $pm $dm $bm $sm"
+    mine+=(-q field.fits --kernel 0.15 --threshold 1.5 --threshold-noise pixel --min-area 5 --columns NUMBER,X_IMAGE,Y_IMAGE,FLUX_AUTO,FLUXERR_AUTO,MAG_AUTO,BACKGROUND)
+    detect "${mine[@]}" -o mine.cat
+    read -r ms ps ds bs ss cs < <(N=$n SCALE=$scale WEIGHTS=$w score sex.cat)
+    read -r mm pm dm bm sm cm < <(N=$n SCALE=$scale WEIGHTS=$w score mine.cat)
+    echo "# $name: Source Extractor: matched $ms purity $ps position $ds px bias $bs scatter $ss completeness $cs; detect: $mm $pm $dm $bm $sm $cm"
     echo "$ms $ps $ds $bs $ss $mm $pm $dm $bm $sm" >>fields.txt
-    between "$name: matched, over Source Extractor's (guards against losing more; the aim is 0.99)" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.955 1.3
-    between "$name: purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.012 0.1
+    between "$name: matched, over Source Extractor's" "$(awk -v a="$mm" -v b="$ms" 'BEGIN { print a / b }')" 0.99 1.3
+    between "$name: purity less Source Extractor's" "$(awk -v a="$pm" -v b="$ps" 'BEGIN { print a - b }')" -0.005 0.1
+    between "$name: completeness to 26 less Source Extractor's" "$(awk -v a="$cm" -v b="$cs" 'BEGIN { print a - b }')" -0.005 0.1
+    [ "$5$6" = 01 ] || return 0
+    # the sky is known here: ours is Source Extractor's, and that between the objects is nearer the truth
+    local known ours theirs dark
+    column() { grep -v '^#' "$1" | awk "{ print $2 }" | med; }
+    known=$(card field.fits SKYLEVEL) ours=$(column mine.cat '$7') theirs=$(column sex.cat '$12')
+    detect "${mine[@]}" --back-type dark -o dark.cat
+    dark=$(column dark.cat '$7')
+    echo "# $name: sky less the true one: Source Extractor $(awk "BEGIN { print $theirs - $known }") electrons, mode $(awk "BEGIN { print $ours - $known }"), dark $(awk "BEGIN { print $dark - $known }")"
+    near "$name: sky, and Source Extractor's" "$ours" "$theirs" 0.05
+    between "$name: error of --back-type dark over Source Extractor's" "$(awk "BEGIN { a = $dark - $known; b = $theirs - $known; print sqrt(a * a / (b * b)) }")" 0 0.8
 }
 if [ -x "${BUILD:-$TOP/build}/tool/spoil" ]; then
-    field "0.04 arcsec" 31 0.04 1800 0 1
-    field "0.16 arcsec, rising sky" 32 0.16 600 60 1
-    field "0.04 arcsec, weights" 33 0.04 1800 5 0.5
-    field "0.16 arcsec, weights" 34 0.16 600 60 0.5
-    sum() { awk "{ a += $1; b += $2 } END { print $3 }" fields.txt; }
-    between "all four: matched, over Source Extractor's" "$(sum '$1' '$6' 'b / a')" 0.99 1.3
-    between "purity less Source Extractor's" "$(awk '{ a += $1; b += $1 / $2; c += $6; d += $6 / $7 } END { print c / d - a / b }' fields.txt)" -0.005 0.1
+    field "0.04 arcsec" 31 0.04 2560 0 1
+    field "0.16 arcsec, rising sky" 32 0.16 1024 60 1
+    field "0.04 arcsec, weights" 33 0.04 2560 5 0.5
+    field "0.16 arcsec, weights" 34 0.16 1024 60 0.5
     between "position error over Source Extractor's" "$(awk '{ s += log($8 / $3) } END { print exp(s / NR) }' fields.txt)" 0.5 1.02
-    # at 0.04 arcsec Source Extractor's sky, low by the 0.42 electron, makes up for light outside its ellipses
     between "magnitude bias less Source Extractor's, 0.16 arcsec" "$(awk '{ if (NR % 2 == 0) s += $9 - $4 } END { print s / 2 }' fields.txt)" -0.2 0.002
-    between "magnitude bias less Source Extractor's, 0.04 arcsec (guards against more; the aim is 0)" "$(awk '{ if (NR % 2) s += $9 - $4 } END { print s / 2 }' fields.txt)" -0.2 0.06
+    between "magnitude bias less Source Extractor's, 0.04 arcsec" "$(awk '{ if (NR % 2) s += $9 - $4 } END { print s / 2 }' fields.txt)" -0.2 0.002
     between "magnitude scatter over Source Extractor's" "$(awk '{ s += log($10 / $5) } END { print exp(s / NR) }' fields.txt)" 0.5 1.02
 else skip "build/tool/spoil is not built: four fields are not compared"; fi
 
@@ -125,7 +127,7 @@ else skip "build/tool/spoil is not built: four fields are not compared"; fi
 if [ -e "$SHARED/truth/detect/A_100.fits.gz" ] && python3=$(command -v /usr/bin/python3) && "$python3" -c 'import astropy, scipy' 2>/dev/null; then
     detect "$SHARED/truth/detect/A_100.fits.gz" --kernel 0.15 --threshold 1.5 --threshold-noise pixel --min-area 5 -o A.cat
     if "$python3" "$SHARED/tools/compare_detect.py" A.cat "$SHARED/truth/detect/truth_A.fits.gz" --ref "$SHARED/truth/detect/sextractor_A_100.fits.gz" \
-        --scale 0.10 --size 1638 --ref-completeness-loss 0 --ref-purity-loss 0.005 --max-bias 0.0606 --max-pos-rms 0.18 >A.txt
+        --scale 0.10 --size 1638 --ref-completeness-loss 0 --ref-purity-loss 0.005 --max-bias 0.0606 --max-pos-rms 0.1754 --min-completeness 0.867 >A.txt
     then pass "A_100: $(grep '^catalogue' A.txt | cut -c1-220)"; else fail "A_100: $(grep -E 'FAIL|^cat' A.txt | tr '\n' ' ')"; fi
 else skip "the reference field or astropy is not there: A_100 is not scored"; fi
 if [ -e "$SHARED/data/hdf/hdfn_f814w.fits" ] && python3=$(command -v /usr/bin/python3) && "$python3" -c 'import astropy' 2>/dev/null; then

@@ -57,7 +57,7 @@ static void plane(long nx, long ny, long cell)
         for (long x = 0; x < nx; x++)
             im.pix[y * nx + x] = (float)(1000 + 0.01 * (double)x - 0.02 * (double)y + draw((uint64_t)(y * nx + x)));
     struct background b;
-    struct background_params p = {cell, 3, 0, 0, 1};
+    struct background_params p = {cell, 3, 0, 0, 1, 0};
     int st = background_measure(&b, &im, NULL, &p);
     if (!check_that(st == OK, "background of %ld x %ld in cells of %ld", nx, ny, cell))
         return;
@@ -65,8 +65,9 @@ static void plane(long nx, long ny, long cell)
     for (long y = 0; st == OK && y < ny; y += 3)
         for (long x = 0; x < nx; x += 3)
             worst = fmax(worst, fabs(mesh_at(&b.level, x, y) - (1000 + 0.01 * (double)x - 0.02 * (double)y)));
-    /* node errors 2 sigma / cell, three of them at an extrapolated corner, plus the 3 x 3 median's error on a slope at the border */
-    double tol = 8.0 / (double)cell + 0.03 * (double)cell;
+    /* four sigma of a node's error 1.9 / sqrt(pixels), times 2.5 at an extrapolated corner; one cell in a row knows no slope */
+    double cells = (double)(b.level.mx * b.level.my), tol = 4 * 1.9 * sqrt(cells / (double)(nx * ny)) * (cells > 1 ? 2.5 : 1);
+    tol += (b.level.mx == 1 ? 0.005 * (double)nx : 0) + (b.level.my == 1 ? 0.01 * (double)ny : 0);
     check_that(worst < tol, "plane: worst %.4f of %.4f", worst, tol);
     float *row = malloc((size_t)nx * sizeof *row), *part = malloc((size_t)nx * sizeof *part);
     int same = 1;
@@ -89,7 +90,7 @@ static void bad_pixels(void)
 {
     struct image im = {0};
     struct background a, b;
-    struct background_params p = {32, 3, 0, 0, 1}, p2 = {32, 3, 0, 0, 2};
+    struct background_params p = {32, 3, 0, 0, 1, 0}, p2 = {32, 3, 0, 0, 2, 0};
     if (image_new(&im, 200, 200))
         return;
     for (long i = 0; i < 40000; i++)
