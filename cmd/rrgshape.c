@@ -322,6 +322,9 @@ static void measure_objects(struct input *in, const struct params *p, const stru
         free(objects);
         return;
     }
+    if (c->max_memory > 0 && shapecat_bytes(in->cat.nrow) > c->max_memory)
+        die(EXIT_RUN, "%s: the shapes of %zu objects need %.0f bytes: raise --max-memory", c->argv[1], in->cat.nrow,
+            shapecat_bytes(in->cat.nrow));
     struct progress bar;
     progress_begin(&bar, "shapes", (long)in->cat.nrow, c->quiet);
     int st = shapecat_measure(&in->cat, &in->map, objects, psf, &o, &bar, &bad);

@@ -241,6 +241,11 @@ static int column_for(struct table *t, const char *name, enum col_type type, con
     return same ? OK : E_DATA;
 }
 
+double shapecat_bytes(size_t rows)
+{
+    return 8.0 * (FIELDS + 1) * (double)rows;
+}
+
 int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
                      const struct starmom *psf, const struct shapecat_options *opt, struct progress *bar, long *bad)
 {

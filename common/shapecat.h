@@ -50,6 +50,9 @@ MUST_CHECK int shapecat_measure(struct table *t, const struct moments_map *map, 
                                 const struct starmom *psf, const struct shapecat_options *opt,
                                 struct progress *bar, long *bad);
 
+/* Bytes that the shape columns of so many rows take. */
+double shapecat_bytes(size_t rows);
+
 /*
  * Star moments as a table: WIDTH [pixel] NSTARS PXX .. PYYYY, errors and covariances
  * (PXX_PXY ..), one row per width; keywords DSTAR, DSTARERR, DSTARW [pixel].

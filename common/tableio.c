@@ -1006,23 +1006,31 @@ static int write_text(const struct table *t, const char *name, const char *recor
 static int write_fits(const struct table *t, const char *name, const char *record, const char *const *inputs,
                       size_t n_inputs, struct err *e)
 {
-    struct table copy = {0};
+    struct table view = *t;                      /* the same columns with one HISTORY line more */
     struct fits_out *f;
-    if (table_copy(&copy, t) || (record && table_history(&copy, record))) {
-        table_free(&copy);
+    view.history = malloc((t->nhistory + 1) * sizeof *view.history);
+    char *line = record ? strdup(record) : NULL;
+    if (!view.history || (record && !line)) {
+        free(view.history);
+        free(line);
         return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
     }
+    for (size_t i = 0; i < t->nhistory; i++)
+        view.history[i] = t->history[i];
+    if (record)
+        view.history[view.nhistory++] = line;
     int st = fits_out_open(&f, name, inputs, n_inputs, e);
     if (!st) {
         st = fits_out_hdu(f, -32, 0, 0, 1, NULL, e);
         if (!st)
-            st = fits_out_table(f, &copy, "CATALOGUE", e);
+            st = fits_out_table(f, &view, "CATALOGUE", e);
         if (st)
             fits_out_abandon(f);
         else
             st = fits_out_commit(f, e);
     }
-    table_free(&copy);
+    free(view.history);
+    free(line);
     return st;
 }
 
