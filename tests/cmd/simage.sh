@@ -261,3 +261,15 @@ near "--truth: DELTA_J2000, arcsec" "$(awk -v a="$(col t.cat DELTA_J2000)" -v b=
 same "--truth: other columns stay" <(col t.cat NOTE) <(echo mine)
 grep -q '^# Keyword: SHEAR1 = 0.03$' t.cat && pass "--truth: keywords of the image" || fail "--truth: no SHEAR1"
 fails "--truth over the output" 2 simage truth.txt -p soft.fits -x 0.1 --size 101,101 --truth t.fits -o t.fits
+
+# columns that a type does not use are not looked at; ID is a label
+printf '# DX DY FLUX TYPE\n0.03 0.01 1 star\n0.2 -0.1 2 star\n' >bare.txt
+printf '# ID DX DY FLUX TYPE RE G1 G2 ROT PARITY DILATION N Q PA\n7 0.03 0.01 1 star nan 5 5 nan 3 -1 99 0 nan\n7 0.2 -0.1 2 star 0 0 0 0 0 0 0 0 0\n' >full.txt
+printf '# ID DX DY FLUX TYPE\n-3 0.03 0.01 1 star\n-3 0.2 -0.1 2 star\n' >ids.txt
+for p in "" "-p soft.fits"; do
+    simage bare.txt $p -x 0.1 --size 20,20 --accuracy 1e-3 -o a.fits
+    ok "stars with columns of galaxies${p:+, PSF}" simage full.txt $p -x 0.1 --size 20,20 --accuracy 1e-3 -o b.fits
+    near "draw the same${p:+, PSF}" "$(NPIX=400 diffmax a.fits b.fits)" 0 0
+    ok "an ID used twice${p:+, PSF}" simage ids.txt $p -x 0.1 --size 20,20 --accuracy 1e-3 -o b.fits
+    near "draws both${p:+, PSF}" "$(NPIX=400 diffmax a.fits b.fits)" 0 0
+done

@@ -168,7 +168,7 @@ static size_t parts_of(const struct plan *p, size_t i)
     return p->emitter[i].parts > 1 ? (size_t)p->emitter[i].parts : 1;
 }
 
-/* Side of the reference of the object whose first part is i: four times its largest stamp's, as far as there is room. */
+/* Side of the reference of the object whose first part is i: four times its largest stamp's, as far as memory goes. */
 static int reference_side(const struct plan *p, size_t i)
 {
     int side = 0;
@@ -177,7 +177,8 @@ static int reference_side(const struct plan *p, size_t i)
         const int larger = d->nx > d->ny ? d->nx : d->ny;
         side = d->path != PATH_NONE && larger > side ? larger : side;
     }
-    return 4 * side < ROOM ? 4 * side : ROOM;
+    const int room = p->view.psf ? (int)fmin(ROOM, 4000 / (p->view.psf->ucut * p->view.pixel)) / 2 * 2 : ROOM;
+    return 4 * side < room ? 4 * side : side > room ? side : room;
 }
 
 /* Worst pixel error of the object whose first part is i over what was requested; NaN when something fails. */

@@ -97,11 +97,63 @@ static void normal(void)
     check_that(fabs(s4 / N - 3) < 4 * sqrt(96.0 / N), "normal fourth moment %.4f", s4 / N);
 }
 
+/* Standard score of a chi-square (Wilson and Hilferty). */
+static double score(double chi, double dof)
+{
+    return (cbrt(chi / dof) - 1 + 2 / (9 * dof)) / sqrt(2 / (9 * dof));
+}
+
+/* n draws, made as read noise is, in cells of 0.05 sigma with 20 or more expected; *mean: score of their mean. */
+static double normal_cells(uint32_t exposure, long n, double *mean)
+{
+    enum { CELLS = 280, RUN = 1024 };
+    static double u[RUN];
+    const struct rng r = rng_stream(9, exposure, RNG_READ);
+    long cell[CELLS] = {0}, dof = -1;
+    double sum = 0, chi = 0, want = 0, seen = 0;
+    for (long i = 0; i < n; i += RUN) {
+        const int m = n - i < RUN ? (int)(n - i) : RUN;
+        rng_uniform_run(&r, (uint64_t)i, 0, m, u);
+        for (int k = 0; k < m; k++) {
+            const double z = rng_normal_inverse(u[k]);
+            sum += z;
+            cell[(int)floor(fmax(-6.99, fmin(6.99, z)) * 20) + CELLS / 2]++;
+        }
+    }
+    for (int k = 0; k < CELLS; k++) {
+        const double lo = (k - CELLS / 2) / 20.0, hi = lo + 0.05;
+        want += (double)n * (lo < 0 ? 0.5 * (erfc(-hi / sqrt(2)) - erfc(-lo / sqrt(2))) : 0.5 * (erfc(lo / sqrt(2)) - erfc(hi / sqrt(2))));
+        seen += (double)cell[k];
+        if (want >= 20) {
+            chi += (seen - want) * (seen - want) / want;
+            dof++;
+            want = seen = 0;
+        }
+    }
+    *mean = sum / sqrt((double)n);
+    return score(chi, (double)dof);
+}
+
+static void normal_statistics(long n)
+{
+    struct check c = check_begin("chi-square of many normal draws in 12 streams (z-score, limit 4.5)");
+    struct check d = check_begin("their mean (z-score, limit 4.5)");
+    for (uint32_t i = 0; i < 12; i++) {
+        double mean, z = normal_cells(i, n, &mean);
+        check_close(&c, z, 0, 4.5);
+        check_close(&d, mean, 0, 4.5);
+    }
+    check_end(&c);
+    check_end(&d);
+}
+
 int main(void)
 {
+    const char *large = getenv("NORMAL_DRAWS");
     known_answers();
     runs();
     uniformity();
     normal();
+    normal_statistics(large ? atol(large) : 200000);
     return check_status();
 }
