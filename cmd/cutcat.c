@@ -84,8 +84,12 @@ static void set_keywords(struct table *t, const struct cuts *c, const struct cut
     check(table_set_number(t, "DCUT", cuts_size(c, c->dstar)), "DCUT");
 }
 
-static void tell(const char *name, const struct cut_count *n)
+static void tell(const char *name, const struct cut_count *n, int only_where)
 {
+    if (only_where) {
+        warn("%s: %zu objects, %zu used", name, n->all, n->where);
+        return;
+    }
     warn("%s: %zu objects, %zu without stars, %zu below the ellipticity, %zu above the size, "
          "%zu above the signal to noise, %zu used", name, n->all, n->stars, n->ellipticity, n->size, n->snr, n->where);
 }
@@ -153,6 +157,7 @@ int main(int argc, char **argv)
         {"snr", 0, OPT_REAL, &cuts.snr, 0, 1e9, "MIN", "keep FLUX_AUTO/FLUXERR_AUTO >= MIN (0: no cut)", NULL, 0},
         {"flags", 0, OPT_LONG, &cuts.flags, 0, 511, "MASK", "FLAGS_RRG with one of these bits fails the size cut", NULL, 0},
         {"where", 0, OPT_STRS, &p.where, 0, 0, "EXPR", "keep NAME<VALUE (< <= > >= = !=); may be given several times", NULL, 0},
+        {"only-where", 0, OPT_FLAG, &cuts.only_where, 0, 0, NULL, "no other cut: for catalogues of any kind", NULL, 0},
         {"columns", 0, OPT_STR, &p.columns, 0, 0, "LIST", "write these columns only: NAME,NAME...", NULL, 0},
         {"mark", 0, OPT_FLAG, &p.mark, 0, 0, NULL, "keep all rows and add the column CUT", NULL, 0},
         {0}};
@@ -167,16 +172,18 @@ int main(int argc, char **argv)
         die(EXIT_RUN, "%s", e.text);
     cuts.locus_mag = p.locus[0];
     cuts.locus_width = p.locus[1];
-    find_dstar(&cuts, &stars, &p, &t, c.max_memory);
+    if (!cuts.only_where)
+        find_dstar(&cuts, &stars, &p, &t, c.max_memory);
     int64_t *bits = calloc(t.nrow + 1, sizeof *bits);
     if (!bits)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
     if (cuts_apply(&t, &cuts, p.where.n, where, bits, &n, &e))
         die(EXIT_RUN, "%s: %s", c.argv[0], e.text);
     if (c.verbose || c.check)
-        tell(c.argv[0], &n);
+        tell(c.argv[0], &n, cuts.only_where);
     if (!c.check) {
-        set_keywords(&t, &cuts, &n);
+        if (!cuts.only_where)
+            set_keywords(&t, &cuts, &n);
         keep_rows(&t, bits, p.mark);
         if (p.columns)
             keep_columns(&t, p.columns, p.mark);

@@ -144,11 +144,11 @@ static int64_t row_bits(const struct cuts *c, const struct used *u, size_t i)
 int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, const struct cut_where *where,
                int64_t *bits, struct cut_count *count, struct err *e)
 {
-    struct used u;
-    int st = find_columns(t, c, &u, e);
+    struct used u = {0};
+    int st = c->only_where ? OK : find_columns(t, c, &u, e);
     if (st)
         return st;
-    if (c->which != DSTAR_EACH && !(c->dstar >= 0))
+    if (!c->only_where && c->which != DSTAR_EACH && !(c->dstar >= 0))
         return err_set(e, E_MISSING, "no size of the stars: give --stars FILE");
     for (size_t k = 0; k < n_where; k++) {
         const struct column *col = table_find(t, where[k].name);
@@ -159,7 +159,7 @@ int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, cons
     }
     struct cut_count n = {.all = t->nrow};
     for (size_t i = 0; i < t->nrow; i++) {
-        int64_t b = row_bits(c, &u, i);
+        int64_t b = c->only_where ? 0 : row_bits(c, &u, i);
         for (size_t k = 0; k < n_where; k++)
             if (!where_holds(&where[k], table_find(t, where[k].name), i))
                 b |= CUT_WHERE;

@@ -24,6 +24,7 @@ enum cut_bit {
 enum dstar { DSTAR_MIN, DSTAR_OWN, DSTAR_EACH };
 
 struct cuts {
+    int only_where;           /* the comparisons alone: no column but theirs is needed */
     double star_prob;         /* an object with STAR_PROB above is a star */
     double locus_mag;         /* and one with MAG_AUTO below this whose size is that of a star under its own weight */
     double locus_width;       /* to this fraction; 0: no such test */
