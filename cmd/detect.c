@@ -27,7 +27,7 @@ struct options {
     struct detect_params p;
     double kernel, psf_fwhm, pixscale, zeropoint, gain, saturation;
     int no_clean, weight_type;
-    const char *weight, *mask, *region, *columns, *measure;
+    const char *weight, *mask, *region, *columns, *measure, *measure_weight;
     int format;
     struct opt_strs checks;
     struct opt_reals apertures, fractions;
@@ -36,7 +36,8 @@ struct options {
 /* The image with what its header says, options first. */
 struct frame {
     struct image im, other;    /* other: --measure */
-    float *map;                /* rms per pixel or NULL */
+    float *map, *other_map;    /* rms per pixel or NULL */
+    char unit[72];             /* of the fluxes */
     double scale;              /* arcsec per pixel, 0 unknown */
     double psf_fwhm;           /* arcsec, 0 unknown */
     double zeropoint;
@@ -80,6 +81,20 @@ static void read_beside(struct image *out, const char *name, const struct image 
         die(EXIT_RUN, "%s: %ld x %ld pixels, the image has %ld x %ld", name, out->nx, out->ny, im->nx, im->ny);
 }
 
+/* A weight map as rms per pixel, NULL without a name. */
+static float *read_weights(const char *name, const struct image *im, const struct options *o, const struct common *c)
+{
+    struct image w = {0};
+    if (!name)
+        return NULL;
+    read_beside(&w, name, im, c->max_memory);
+    detect_weights(w.pix, image_count(im), (enum weight_type)o->weight_type);
+    float *map = w.pix;
+    w.pix = NULL;
+    image_free(&w);
+    return map;
+}
+
 static void read_maps(struct frame *f, const struct options *o, const struct common *c)
 {
     size_t n = image_count(&f->im);
@@ -91,14 +106,17 @@ static void read_maps(struct frame *f, const struct options *o, const struct com
                 f->im.pix[i] = NAN;
         image_free(&mask);
     }
-    if (o->weight) {
-        struct image w = {0};
-        read_beside(&w, o->weight, &f->im, c->max_memory);
-        detect_weights(w.pix, n, (enum weight_type)o->weight_type);
-        f->map = w.pix;
-        w.pix = NULL;
-        image_free(&w);
-    }
+    f->map = read_weights(o->weight, &f->im, o, c);
+    f->other_map = read_weights(o->measure_weight, &f->im, o, c);
+}
+
+/* Unit of the catalogue's fluxes: BUNIT, electron when GAIN is 1 without one, else count. */
+static void flux_unit(struct frame *f, const struct header *h, const struct exposure *x)
+{
+    if (x->unit == UNIT_ELECTRON || (x->unit == UNIT_NONE && f->gain >= 1 && f->gain <= 1))
+        snprintf(f->unit, sizeof f->unit, "electron");
+    else if (header_str(h, "BUNIT", f->unit, sizeof f->unit) || !f->unit[0])
+        snprintf(f->unit, sizeof f->unit, "count");
 }
 
 /* Every output has a file of its own. */
@@ -125,7 +143,7 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     struct err e;
     if (image_read(&f->im, in, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0)) + 32 * 1048576.0;
+    double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0) + (o->measure_weight ? 4 : 0)) + 32 * 1048576.0;
     if (need > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
     if (o->measure)
@@ -148,6 +166,7 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     f->has_zeropoint = opt_given(own, c, "zeropoint") || header_double(flux, "MAGZERO", &f->zeropoint) == OK;
     if (opt_given(own, c, "zeropoint"))
         f->zeropoint = o->zeropoint;
+    flux_unit(f, flux, &x);
     read_maps(f, o, c);
 }
 
@@ -158,6 +177,7 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
     struct detect_params p = o->p;
     const struct header *h = o->measure ? &f->other.hdr : &f->im.hdr;
     p.measure = o->measure ? &f->other : NULL;
+    p.measure_map = f->other_map;
     p.threads = c->threads;
     p.clean = !o->no_clean;
     p.phot.gain = f->gain;
@@ -349,7 +369,7 @@ static void write_catalogue(const struct frame *f, const struct options *o, cons
     struct table t = {0};
     struct err e;
     struct detectcat dc = {o->columns, f->has_zeropoint ? f->zeropoint : 0, f->scale, f->sky, o->apertures.n,
-                           o->fractions.n ? o->fractions.n - 1 : 0};
+                           o->fractions.n ? o->fractions.n - 1 : 0, f->unit};
     if (detectcat_fill(&t, d, &dc, &e))
         die(EXIT_RUN, "%s", e.text);
     copy_keywords(&t, f, p, d);
@@ -483,6 +503,8 @@ int main(int argc, char **argv)
          .help = "parts of FLUX_AUTO inside FLUX_RADIUS, FLUX_RADIUS_2, ... (default: 0.5)"},
         {.name = "measure", .letter = 'm', .type = OPT_STR, .value = &o.measure, .arg = "FILE", .in_file = 1,
          .help = "detect in IMAGE, measure in this one"},
+        {.name = "measure-weight", .type = OPT_STR, .value = &o.measure_weight, .arg = "FILE", .in_file = 1,
+         .help = "weight map of that image, of the type of --weight"},
         {.name = "format", .type = OPT_CHOICE, .value = &o.format, .choices = "name|ldac", .arg = "FORMAT",
          .help = "of the catalogue: as the name says (.fits, .ldac, else text), or FITS_LDAC"},
         {.name = "columns", .letter = 'c', .type = OPT_STR, .value = &o.columns, .arg = "LIST",
@@ -496,10 +518,15 @@ int main(int argc, char **argv)
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    const char *in = c.argv[0], *inputs[4] = {in};
+    const char *in = c.argv[0], *inputs[5] = {in};
     size_t n_inputs = 1;
     if (o.p.back_filter % 2 == 0)
         die(EXIT_USAGE, "--back-filter %ld: give an odd number", o.p.back_filter);
+    char unknown[64];
+    if (detectcat_unknown(o.columns, unknown))
+        die(EXIT_USAGE, "--columns: there is no column '%s': see detect(1)", unknown);
+    if (o.measure_weight && !o.measure)
+        die(EXIT_USAGE, "--measure-weight %s: is the weight of another image: give --measure", o.measure_weight);
     check_outputs(&o, c.out);
     if (o.weight)
         inputs[n_inputs++] = o.weight;
@@ -507,6 +534,8 @@ int main(int argc, char **argv)
         inputs[n_inputs++] = o.mask;
     if (o.measure)
         inputs[n_inputs++] = o.measure;
+    if (o.measure_weight)
+        inputs[n_inputs++] = o.measure_weight;
 
     struct frame f = {0};
     read_frame(&f, in, &o, own, &c);
@@ -524,6 +553,7 @@ int main(int argc, char **argv)
         search(&f, &prog, own, &o, &c, &p, inputs, n_inputs);
     free(diameter);
     free(f.map);
+    free(f.other_map);
     sky_close(f.sky);
     image_free(&f.im);
     image_free(&f.other);

@@ -37,7 +37,7 @@ static void cell_box(const struct mesh *m, long i, long j, long box[4])
 }
 
 /* Median over the cells of measured rms / rms of the map; 0 when there is none. */
-static int map_scale(const struct image *im, const struct background *b, const float *map, double *scale)
+static int map_ratio(const struct image *im, const struct background *b, const float *map, double *scale)
 {
     const struct mesh *m = &b->rms;
     double *ratio = malloc((size_t)m->mx * (size_t)m->my * sizeof *ratio);
@@ -63,6 +63,22 @@ static int map_scale(const struct image *im, const struct background *b, const f
         }
     *scale = n ? background_median(ratio, n) : 0;
     free(ratio);
+    return OK;
+}
+
+/* Scale the map to the noise measured, or to rms where that is given. */
+static int scale_map(const struct image *im, const struct background *b, float *map, double rms)
+{
+    double scale;
+    int st = map_ratio(im, b, map, &scale);
+    if (st)
+        return st;
+    if (rms > 0)
+        scale *= rms / b->mean_rms;
+    if (!(scale > 0))
+        return E_SINGULAR;
+    for (size_t i = 0; i < image_count(im); i++)
+        map[i] *= (float)scale;
     return OK;
 }
 
@@ -279,7 +295,7 @@ static int measure_objects(void *ctx, long begin, long end, int worker)
     return st;
 }
 
-static int measure_all(const struct image *im, const float *map, const struct detect_params *p,
+static int measure_all(const struct image *im, const float *map, int relative, const struct detect_params *p,
                        const struct blob_list *all, struct detection *d)
 {
     struct photometry_params phot = p->phot;
@@ -293,11 +309,13 @@ static int measure_all(const struct image *im, const float *map, const struct de
     struct measuring t = {{im, &d->background, &d->label, &phot, 0}, all, d, p->progress, DETECT_STEPS / 2};
     if (p->measure) {
         struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads, p->dark_sky};
-        int st = background_measure(&d->measured, p->measure, NULL, &bp);
+        int st = background_measure(&d->measured, p->measure, p->measure_map, &bp);
+        if (!st && p->measure_map && relative)
+            st = scale_map(p->measure, &d->measured, p->measure_map, 0);
         if (st)
             return st;
         phot.noise = d->measured.mean_rms;
-        phot.rms_map = NULL;
+        phot.rms_map = p->measure_map;
         t.f = (struct field){p->measure, &d->measured, &d->label, &phot, 1};
     }
     return par_for((long)all->n, OBJECTS, p->threads, measure_objects, &t);
@@ -312,18 +330,10 @@ static int prepare(const struct image *im, float *map, int relative, const struc
     if (st)
         return st;
     d->noise = p->rms > 0 ? p->rms : d->background.mean_rms;
-    if (map && relative) {
-        double scale;
-        st = map_scale(im, &d->background, map, &scale);
-        if (st)
-            return st;
-        if (p->rms > 0)
-            scale *= p->rms / d->background.mean_rms;
-        if (!(scale > 0))
-            return E_SINGULAR;
-        for (size_t i = 0; i < image_count(im); i++)
-            map[i] *= (float)scale;
-    }
+    if (map && relative)
+        st = scale_map(im, &d->background, map, p->rms);
+    if (st)
+        return st;
     if (!map && !(d->noise > 0))
         return E_SINGULAR;
     st = smooth_new(&d->filter, p->kernel_fwhm);
@@ -355,7 +365,7 @@ int detect_run(const struct image *im, float *rms_map, int relative, const struc
     if (!st && p->negative)
         out.n = all.n;
     else if (!st)
-        st = measure_all(im, rms_map, p, &all, &out);
+        st = measure_all(im, rms_map, relative, p, &all, &out);
     free(all.blob);
     if (st)
         detection_free(&out);

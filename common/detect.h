@@ -40,6 +40,7 @@ struct detect_params {
     int threads;
     struct photometry_params phot;     /* noise and rms_map are filled in */
     const struct image *measure;       /* photometry in this image of the same size; NULL: in the same one */
+    float *measure_map;                /* its rms per pixel, as rms_map of detect_run(), or NULL */
     struct progress *progress;         /* of DETECT_STEPS; or NULL */
 };
 

@@ -8,7 +8,7 @@
 
 enum how {
     NUMBER, REAL, PIXEL, WHOLE, WHOLE_PIXEL, RIGHT_ASCENSION, DECLINATION, MAGNITUDE,
-    MAGNITUDE_ERROR, SURFACE, ELLIPTICITY, ERROR_A, ERROR_B, ERROR_THETA, APERTURES
+    MAGNITUDE_ERROR, SURFACE, ELLIPTICITY, ERROR_A, ERROR_B, ERROR_THETA
 };
 
 struct definition {
@@ -20,6 +20,8 @@ struct definition {
     const char *unit, *what;
 };
 
+static const char COUNT[] = "count";       /* stands for the unit of the image */
+
 #define AT(member) offsetof(struct object, member)
 
 static const struct definition all[] = {
@@ -28,8 +30,8 @@ static const struct definition all[] = {
     {"Y_IMAGE", PIXEL, COL_REAL, AT(y), 0, 1, "pixel", "Centroid along y, first pixel centre is 1"},
     {"ALPHA_J2000", RIGHT_ASCENSION, COL_REAL, 0, 0, 1, "deg", "Right ascension of the centroid"},
     {"DELTA_J2000", DECLINATION, COL_REAL, 0, 0, 1, "deg", "Declination of the centroid"},
-    {"FLUX_AUTO", REAL, COL_REAL32, AT(flux_auto), 0, 1, "count", "Flux in the Kron ellipse"},
-    {"FLUXERR_AUTO", REAL, COL_REAL32, AT(err_auto), 0, 1, "count", "Rms error of FLUX_AUTO"},
+    {"FLUX_AUTO", REAL, COL_REAL32, AT(flux_auto), 0, 1, COUNT, "Flux in the Kron ellipse"},
+    {"FLUXERR_AUTO", REAL, COL_REAL32, AT(err_auto), 0, 1, COUNT, "Rms error of FLUX_AUTO"},
     {"MAG_AUTO", MAGNITUDE, COL_REAL32, AT(flux_auto), AT(err_auto), 1, "mag", "Kron magnitude, 99 without flux"},
     {"MAGERR_AUTO", MAGNITUDE_ERROR, COL_REAL32, AT(flux_auto), AT(err_auto), 1, "mag", "Rms error of MAG_AUTO"},
     {"A_IMAGE", REAL, COL_REAL32, AT(a), 0, 1, "pixel", "Rms along the major axis of the isophote"},
@@ -38,17 +40,16 @@ static const struct definition all[] = {
     {"FWHM_IMAGE", REAL, COL_REAL32, AT(fwhm), 0, 1, "pixel", "Width at half maximum of the fitted Gaussian"},
     {"FLUX_RADIUS", REAL, COL_REAL32, AT(flux_radius), 0, 1, "pixel", "Radius of the circle with the given fraction of FLUX_AUTO"},
     {"ISOAREA_IMAGE", WHOLE, COL_INT, AT(area_above), 0, 1, "pixel2", "Unfiltered pixels of the object above THRESHOLD"},
-    {"BACKGROUND", REAL, COL_REAL, AT(background), 0, 1, "count", "Sky level at the centroid"},
-    {"BACKRMS", REAL, COL_REAL32, AT(rms), 0, 1, "count", "Noise of a pixel at the centroid"},
-    {"FLUX_MAX", REAL, COL_REAL32, AT(peak), 0, 1, "count", "Brightest pixel above the sky"},
+    {"BACKGROUND", REAL, COL_REAL, AT(background), 0, 1, COUNT, "Sky level at the centroid"},
+    {"BACKRMS", REAL, COL_REAL32, AT(rms), 0, 1, COUNT, "Noise of a pixel at the centroid"},
+    {"FLUX_MAX", REAL, COL_REAL32, AT(peak), 0, 1, COUNT, "Brightest pixel above the sky"},
     {"STAR_PROB", REAL, COL_REAL32, AT(star_prob), 0, 1, "", "Probability of a point source"},
     {"FLAGS", WHOLE, COL_INT, AT(flags), 0, 1, "", "Sum of the flag bits"},
     {"ISOAREAF_IMAGE", WHOLE, COL_INT, AT(area), 0, 0, "pixel2", "Pixels of the object in the filtered image"},
-    {"FLUX_ISO", REAL, COL_REAL32, AT(flux_iso), 0, 0, "count", "Flux of the isophote"},
-    {"FLUXERR_ISO", REAL, COL_REAL32, AT(err_iso), 0, 0, "count", "Rms error of FLUX_ISO"},
+    {"FLUX_ISO", REAL, COL_REAL32, AT(flux_iso), 0, 0, COUNT, "Flux of the isophote"},
+    {"FLUXERR_ISO", REAL, COL_REAL32, AT(err_iso), 0, 0, COUNT, "Rms error of FLUX_ISO"},
     {"MAG_ISO", MAGNITUDE, COL_REAL32, AT(flux_iso), AT(err_iso), 0, "mag", "Isophotal magnitude, 99 without flux"},
     {"MAGERR_ISO", MAGNITUDE_ERROR, COL_REAL32, AT(flux_iso), AT(err_iso), 0, "mag", "Rms error of MAG_ISO"},
-    {"FLUX_APER", APERTURES, COL_REAL32, 0, 0, 0, "count", "Flux in circular apertures"},
     {"KRON_RADIUS", REAL, COL_REAL32, AT(kron_radius), 0, 0, "", "Kron ellipse in units of A_IMAGE"},
     {"X2_IMAGE", REAL, COL_REAL32, AT(xx), 0, 0, "pixel2", "Variance along x"},
     {"Y2_IMAGE", REAL, COL_REAL32, AT(yy), 0, 0, "pixel2", "Variance along y"},
@@ -63,7 +64,7 @@ static const struct definition all[] = {
     {"XWIN_IMAGE", PIXEL, COL_REAL, AT(xwin), 0, 0, "pixel", "Windowed centroid along x"},
     {"YWIN_IMAGE", PIXEL, COL_REAL, AT(ywin), 0, 0, "pixel", "Windowed centroid along y"},
     {"MU_MAX", SURFACE, COL_REAL32, AT(peak), 0, 0, "mag/arcsec2", "Peak surface brightness"},
-    {"THRESHOLD", REAL, COL_REAL32, AT(threshold), 0, 0, "count", "Detection level above the sky in the filtered image"},
+    {"THRESHOLD", REAL, COL_REAL32, AT(threshold), 0, 0, COUNT, "Detection level above the sky in the filtered image"},
     {"XPEAK_IMAGE", WHOLE_PIXEL, COL_INT, AT(xpeak), 0, 0, "pixel", "Brightest pixel along x"},
     {"YPEAK_IMAGE", WHOLE_PIXEL, COL_INT, AT(ypeak), 0, 0, "pixel", "Brightest pixel along y"},
     {"XMIN_IMAGE", WHOLE_PIXEL, COL_INT, AT(xmin), 0, 0, "pixel", "First column of the isophote"},
@@ -87,6 +88,41 @@ static const char *next_name(const char *list, char name[64])
     memcpy(name, list, keep);
     name[keep] = 0;
     return list[n] ? list + n + 1 : NULL;
+}
+
+/* FLUX_APER, MAGERR_APER_2, FLUX_RADIUS_3, ...: they come with --apertures and --flux-fraction, asked for or not. */
+static int numbered(const char *name)
+{
+    static const char *const stem[] = {"FLUX_APER", "FLUXERR_APER", "MAG_APER", "MAGERR_APER", "FLUX_RADIUS"};
+    for (size_t k = 0; k < sizeof stem / sizeof *stem; k++) {
+        size_t n = strlen(stem[k]);
+        if (strncmp(name, stem[k], n))
+            continue;
+        if (!name[n])
+            return k < 4;
+        if (name[n] == '_' && name[n + 1] > '0' && name[n + 1] <= '9' && strspn(name + n + 1, "0123456789") == strlen(name + n + 1))
+            return 1;
+    }
+    return 0;
+}
+
+static size_t find_definition(const char *name)
+{
+    size_t i = 0;
+    while (i < COLUMNS && strcmp(all[i].name, name) != 0)
+        i++;
+    return i;
+}
+
+int detectcat_unknown(const char *columns, char name[64])
+{
+    const char *list = columns && *columns == '+' ? columns + 1 : columns;
+    while (list) {
+        list = next_name(list, name);
+        if (find_definition(name) == COLUMNS && !numbered(name))
+            return 1;
+    }
+    return 0;
 }
 
 int detectcat_windowed(const char *columns)
@@ -195,7 +231,7 @@ static int add_apertures(struct table *t, int fill, const struct detection *d, c
             else
                 snprintf(name, sizeof name, "%s_%zu", stem[j], k + 1);
             if (!fill)
-                st = table_add(t, name, COL_REAL32, j < 2 ? "count" : "mag", what[j]);
+                st = table_add(t, name, COL_REAL32, j < 2 ? c->unit : "mag", what[j]);
             if (st)
                 return st;
             struct column *col = fill ? table_find(t, name) : NULL;
@@ -231,9 +267,7 @@ static int add_column(struct table *t, const struct definition *def, const struc
         return err_set(e, E_MISSING, "column %s: the image has no world coordinates", def->name);
     if (def->how == SURFACE && !(c->scale > 0))
         return err_set(e, E_MISSING, "column %s: the pixel scale is unknown: give --pixscale", def->name);
-    if (def->how == APERTURES)
-        return c->napertures ? OK : err_set(e, E_MISSING, "column %s: give --apertures", def->name);
-    int st = table_add(t, def->name, def->type, def->unit, def->what);
+    int st = table_add(t, def->name, def->type, def->unit == COUNT ? c->unit : def->unit, def->what);
     if (st == E_RANGE)
         return err_set(e, E_MISSING, "column %s is asked for twice", def->name);
     return st ? err_set(e, st, "%s", err_text(st)) : OK;
@@ -243,12 +277,15 @@ static int add_named(struct table *t, const char *list, const struct detectcat *
 {
     while (list) {
         char name[64];
-        size_t i = 0;
         list = next_name(list, name);
-        while (i < COLUMNS && strcmp(all[i].name, name) != 0)
-            i++;
-        if (i == COLUMNS)
+        size_t i = find_definition(name);
+        int radius = strncmp(name, "FLUX_RADIUS", 11) == 0;
+        if (i == COLUMNS && !numbered(name))
             return err_set(e, E_MISSING, "there is no column '%s': see detect(1)", name);
+        if (numbered(name) && (radius ? c->nfractions : c->napertures) == 0)
+            return err_set(e, E_MISSING, "column %s: give %s", name, radius ? "--flux-fraction" : "--apertures");
+        if (numbered(name))
+            continue;
         int st = add_column(t, &all[i], c, e);
         if (st)
             return st;
@@ -283,7 +320,7 @@ int detectcat_fill(struct table *t, const struct detection *d, const struct dete
         st = add_radii(t, 1, d, c);
     for (size_t k = 0; k < t->ncol && !st; k++)
         for (size_t i = 0; i < COLUMNS; i++)
-            if (all[i].how != APERTURES && strcmp(all[i].name, t->col[k].name) == 0)
+            if (strcmp(all[i].name, t->col[k].name) == 0)
                 fill_column(&t->col[k], &all[i], d, c);
     if (!st)
         st = fill_sky(t, d, c);

@@ -17,14 +17,18 @@ struct detectcat {
     struct sky *sky;           /* NULL: no ALPHA_J2000 and DELTA_J2000 */
     size_t napertures;         /* columns FLUX_APER, FLUX_APER_2, ... and errors and magnitudes */
     size_t nfractions;         /* columns FLUX_RADIUS_2, ... */
+    const char *unit;          /* of fluxes: the image's */
 };
 
 /* Fill an empty table. E_MISSING: a column that does not exist or cannot be made; e names it. */
 MUST_CHECK int detectcat_fill(struct table *t, const struct detection *d, const struct detectcat *c,
                               struct err *e);
 
-/* All column names with unit and meaning, one "NAME unit meaning" a line, for the manual and errors. */
+/* Name of column i, NULL after the last. */
 const char *detectcat_name(size_t i);
+
+/* 1, and the name, when the list has one that is not a column. */
+int detectcat_unknown(const char *columns, char name[64]);
 
 /* 1 when the list asks for XWIN_IMAGE or YWIN_IMAGE. */
 int detectcat_windowed(const char *columns);

@@ -510,7 +510,8 @@ static void from_blob(const struct field *f, const struct blob *b, struct object
     o->rms = mesh_at(&f->b->rms, x, y);
     double rms = f->p->noise;
     if (f->p->rms_map) {
-        rms = (double)f->p->rms_map[(size_t)b->ypeak * (size_t)f->im->nx + (size_t)b->xpeak];
+        double there = (double)f->p->rms_map[(size_t)b->ypeak * (size_t)f->im->nx + (size_t)b->xpeak];
+        rms = there <= FLT_MAX ? there : o->rms;       /* a bad pixel of the image of the photometry */
         o->rms = rms;
     }
     o->flux_iso = b->flux;

@@ -60,7 +60,17 @@ near "columns asked for" "$(grep -v '^#' c.cat | head -1 | wc -w)" 4 0
 detect f.fits --apertures 0.6,1.2 --columns +KRON_RADIUS -o a.cat
 near "aperture of radius 6 px, sigma 2" "$(row a.cat 40.3 50.6 FLUX_APER_2)" 29670 700
 near "and of 3 px" "$(row a.cat 40.3 50.6 FLUX_APER)" 20150 400
-fails "a column that does not exist" 1 detect f.fits --columns NUMBER,NOPE -o x.cat
+fails "a column that does not exist" 2 detect f.fits --columns NUMBER,NOPE -o x.cat
+grep -q "'NOPE'" cmd.err && pass "and is named" || fail "it is not named: $(cat cmd.err)"
+fails "before the image is read" 2 detect none.fits --columns +NOPE
+fails "an aperture's column without apertures" 1 detect f.fits --columns NUMBER,MAG_APER -o x.cat
+detect f.fits --apertures 0.6,1.2 --columns NUMBER,X_IMAGE,Y_IMAGE,MAG_APER_2 -o na.cat
+near "apertures named in the list: their eight columns" "$(grep -v '^#' na.cat | head -1 | wc -w)" 11 0
+detect f.fits -o u.fits
+near "flux in electrons, where GAIN is 1 and BUNIT missing" "$(fold -w80 u.fits | grep -ac "^TUNIT.*'electron'")" 5 0
+sed "s/^\(.*\)EXPTIME =               2000.0 /\1BUNIT   = 'nJy     '           /" f.fits >njy.fits
+detect njy.fits -o u.fits
+near "in BUNIT, where that is something else" "$(fold -w80 u.fits | grep -ac "^TUNIT.*'nJy *'")" 5 0
 fails "a check image that does not exist" 2 detect f.fits --check-image what=x.fits
 fails "an even median filter" 2 detect f.fits --back-filter 2
 [ ! -e x.cat ] && pass "no output after an error" || fail "x.cat exists"
@@ -136,6 +146,15 @@ near "its zero point" "$(row dual.cat 40.3 50.6 MAG_AUTO)" 21.12 0.04
 near "its sky" "$(row dual.cat 40.3 50.6 BACKGROUND)" 100 1.5
 near "nothing where it is empty" "$(row dual.cat 130 130 FLUX_AUTO)" 0 700
 same "measured in itself: the catalogue of one image" <(grep -v '^#' f.cat) <(detect f.fits --measure f.fits | grep -v '^#')
+mk 160 160 'x < 110 ? 1 : 4' >ow.fits
+detect f.fits --measure other.fits --measure-weight ow.fits --columns +FLUXERR_ISO -o dw.cat
+near "its own weight map: four times the weight, half the noise" "$(awk "BEGIN { print $(row dw.cat 120.7 30.2 BACKRMS) / $(row dw.cat 40.3 50.6 BACKRMS) }")" 0.5 0.001
+near "at the noise measured" "$(row dw.cat 40.3 50.6 BACKRMS)" 10 1
+mk 160 160 'x < 100 ? 1 : 0' >ow.fits
+detect f.fits --measure other.fits --measure-weight ow.fits -o dw.cat
+near "no weight there: flagged" "$(row dw.cat 120.7 30.2 FLAGS | awk '{ print int($1 / 32) % 2 }')" 1 0
+near "without flux" "$(row dw.cat 120.7 30.2 FLUX_AUTO)" 0 0
+fails "weight of another image without that image" 2 detect f.fits --measure-weight ow.fits
 mk 80 160 1 >small.fits
 fails "another image of another size" 1 detect f.fits --measure small.fits
 ok "apertures drawn" detect f.fits --apertures 1.2 --check-image apertures=ap.fits -o ap.cat
