@@ -13,6 +13,7 @@
 #include "ldac.h"
 #include "opt.h"
 #include "outfile.h"
+#include "region.h"
 #include "progress.h"
 #include "segment.h"
 #include "sky.h"
@@ -234,23 +235,14 @@ static void copy_keywords(struct table *t, const struct frame *f, const struct d
 static void write_region(const char *name, const struct detection *d, const char *const *inputs, size_t n)
 {
     struct err e;
-    struct outfile *f;
-    if (outfile_open(&f, name, inputs, n, &e))
+    struct region *r;
+    if (region_open(&r, name, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
-    char line[256];
-    int st = OK, len = snprintf(line, sizeof line, "# Region file format: DS9 version 4.1\nglobal color=green\nimage\n");
-    st = outfile_write(f, line, (size_t)len);
-    for (size_t i = 0; i < d->n && !st; i++) {
+    for (size_t i = 0; i < d->n; i++) {
         const struct object *o = &d->object[i];
-        len = snprintf(line, sizeof line, "ellipse(%.3f,%.3f,%.3f,%.3f,%.2f) # text={%zu}\n", o->x + 1, o->y + 1,
-                       o->a * o->kron_radius, o->b * o->kron_radius, o->theta, i + 1);
-        st = outfile_write(f, line, (size_t)len);
+        region_ellipse(r, o->x + 1, o->y + 1, o->a * o->kron_radius, o->b * o->kron_radius, o->theta, i + 1, NULL);
     }
-    if (st) {
-        outfile_abandon(f);
-        die(EXIT_RUN, "%s: %s", name, err_text(st));
-    }
-    if (outfile_commit(f, &e))
+    if (region_close(r, &e))
         die(EXIT_RUN, "%s", e.text);
 }
 

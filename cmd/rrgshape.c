@@ -6,7 +6,9 @@
 #include "err.h"
 #include "imageio.h"
 #include "opt.h"
+#include "outfile.h"
 #include "psfio.h"
+#include "region.h"
 #include "shapecat.h"
 #include "sky.h"
 #include "starpsf.h"
@@ -18,7 +20,7 @@
 #include <unistd.h>
 
 struct params {
-    const char *stars, *psf, *weight, *segmentation;
+    const char *stars, *psf, *weight, *segmentation, *region;
     double width, fixed, min, max, cut, scale, pixel;
     int fourth, correction, average;
     int centroid, no_recenter, no_background, stars_only;
@@ -301,6 +303,30 @@ static void write_catalogue(const struct table *t, const struct program *prog, c
     free(record);
 }
 
+/* DS9: the second moments as observed, as an ellipse of twice their rms; red with a flag, the weight where there are none. */
+static void write_region(const struct table *t, const struct params *p, const struct common *c)
+{
+    struct err e;
+    struct region *r;
+    const char *inputs[] = {c->argv[0], c->argv[1]};
+    const double *x = table_reals(t, "X_RRG"), *y = table_reals(t, "Y_RRG"), *w = table_reals(t, "WIDTH");
+    const double *xx = table_reals(t, "JXX_RAW"), *xy = table_reals(t, "JXY_RAW"), *yy = table_reals(t, "JYY_RAW");
+    const int64_t *flags = table_ints(t, "FLAGS_RRG");
+    const struct column *number = table_find(t, "NUMBER");
+    if (region_open(&r, p->region, inputs, 2, &e))
+        die(EXIT_RUN, "%s", e.text);
+    for (size_t i = 0; i < t->nrow; i++) {
+        const double mean = 0.5 * (xx[i] + yy[i]), half = 0.5 * hypot(xx[i] - yy[i], 2 * xy[i]);
+        const int good = mean - half > 0;
+        if (isfinite(x[i]) && isfinite(y[i]))
+            region_ellipse(r, x[i], y[i], good ? 2 * sqrt(mean + half) : w[i], good ? 2 * sqrt(mean - half) : w[i],
+                           good ? 90 / M_PI * atan2(2 * xy[i], xx[i] - yy[i]) : 0, (size_t)table_number(number, i),
+                           flags[i] ? "red" : NULL);
+    }
+    if (region_close(r, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
 /* Shapes of the galaxies; the catalogue of `in` gets the columns. */
 static void measure_objects(struct input *in, const struct params *p, const struct common *c)
 {
@@ -335,6 +361,8 @@ static void measure_objects(struct input *in, const struct params *p, const stru
     check(catkeys_copy(&in->cat, &in->hdr), "keywords");
     if (psf)
         set_psf(&in->cat, psf, own, in->scale);
+    if (p->region)
+        write_region(&in->cat, p, c);
     if (c->verbose)
         warn("%s: %zu objects, %ld with flags", c->argv[1], in->cat.nrow, bad);
     free(objects);
@@ -388,6 +416,7 @@ int main(int argc, char **argv)
         {"no-background", 0, OPT_FLAG, &p.no_background, 0, 0, NULL, "do not subtract the column BACKGROUND", NULL, 0},
         {"weight", 0, OPT_STR, &p.weight, 0, 0, "FILE", "weight map: 1/variance when WHTTYPE is IVM, else relative", NULL, 1},
         {"segmentation", 0, OPT_STR, &p.segmentation, 0, 0, "FILE", "labels of pixels: neighbours are masked", NULL, 1},
+        {"region", 0, OPT_STR, &p.region, 0, 0, "FILE", "ellipses of the objects for DS9", NULL, 1},
         {"star-average", 0, OPT_CHOICE, &p.average, 0, 0, "HOW", "average over stars", "mean|median", 0},
         {"max-stars", 0, OPT_LONG, &p.max_stars, 0, 1e9, "N", "use N of the good stars, spread over the catalogue (0: all)", NULL, 0},
         {"pixscale", 'x', OPT_REAL, &p.scale, 0, 1e4, "ARCSEC", "pixel scale over the header's, arcsec (0: header)", NULL, 0},
@@ -399,6 +428,8 @@ int main(int argc, char **argv)
     if (!p.stars_only && !p.stars == !p.psf)
         die(EXIT_USAGE, "give one of --stars FILE, --psf FILE, --psf none");
 
+    if (p.region && (p.stars_only || outfile_same(p.region, c.out)))
+        die(EXIT_USAGE, "--region %s: not with --stars-only, and not the output", p.region);
     struct input in;
     struct table curve = {0};
     read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);

@@ -81,3 +81,14 @@ ok "--only-where" cutcat any.txt --only-where --where 'X>2' --where 'NAME=b' -o 
 same "keeps the rows that hold" <(col any.out ID) <(printf '2\n4\n')
 ok "--only-where on its result" cutcat any.out --only-where --where 'X<3' --mark -o any.two
 same "marks" <(col any.two CUT) <(printf '0\n16\n')
+
+# the 0.4 on a field of galaxies: what it removes lies between 1.2 d* and 1.2 sqrt(d*^2 + 0.4)
+galgen --field 50 --models m.txt | simage - --models m.txt -p psf.fits -x 0.1 --set g | addnoise --depth 27.7 -o g.fits
+detect -q g.fits --threshold 1.5 --threshold-noise pixel -o g.cat; rrgshape -q g.fits g.cat --psf psf.fits -o g.rrg
+cutcat g.rrg -o with.use; cutcat g.rrg --size-floor 0 -o without.use
+with=$(key with.use NUSED) without=$(key without.use NUSED)
+between "more are used without the 0.4 ($with with it)" "$without" $((with * 103 / 100 + 1)) $((with * 3))
+near "d_cut without it: 1.2 d*" "$(awk -v a="$(key without.use DCUT)" -v b="$(key without.use DSTAR)" 'BEGIN { print a / b }')" 1.2 1e-9
+near "the others lie between both limits" "$(paste <(col without.use NUMBER) <(col without.use D_RRG) | awk -v lo="$(key without.use DCUT)" -v hi="$(key with.use DCUT)" '$2 >= lo && $2 < hi' | wc -l)" $((without - with)) 0
+near "in the star and ellipticity cuts nothing changes" "$(key without.use NELLCUT)" "$(key with.use NELLCUT)" 0
+near "|e| > 1 never counts" "$(paste <(col with.use E1) <(col with.use E2) | awk '$1 * $1 + $2 * $2 >= 1' | wc -l)" 0 0

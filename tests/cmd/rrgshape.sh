@@ -86,6 +86,12 @@ near "shear of the image travels" "$(key im.out SHEAR1)" 0.05 0
 near "all input columns are kept" "$(col im.out A_IMAGE | head -1)" 2.5 0
 rrgshape im.fits im.cat --psf none -j 2 -o two.out; same "one and two threads" im.out two.out
 rrgshape im.fits im.cat --psf none >pipe.out; same "standard output" im.out pipe.out
+ok "--region" rrgshape im.fits im.cat --psf none --region im.reg -o reg.out
+near "the first object's ellipse: 2 sqrt(Jxx) = 4.16" "$(grep -m1 '^ellipse(20\.[23]' im.reg | cut -d, -f3)" 4.16 0.02
+near "one for each with a position that is a number" "$(grep -c '^ellipse' im.reg)" 4 0
+near "red where there is a flag" "$(grep -c 'color=red text' im.reg)" "$(paste <(col reg.out FLAGS_RRG) <(col reg.out X_RRG) | grep -v nan | awk '$1' | wc -l)" 0
+fails "--region is the output" 2 rrgshape im.fits im.cat --psf none --region reg.out -o reg.out
+fails "--region is an input" 1 rrgshape im.fits im.cat --psf none --region im.cat -o reg.out
 rrgshape - im.cat --psf none <im.fits >pipe.out
 near "image from a pipe" "$(paste <(col im.out JXX_RAW) <(col pipe.out JXX_RAW) | awk '$1 != $2' | wc -l)" 0 0
 rrgshape im.fits im.out --psf none -o again.out
