@@ -18,11 +18,19 @@
 
 enum { BINS = 1024, SAMPLE = 512, LANES = 8 };
 
-/* Counts, and running sums below each edge: number, sum of k, sum of k^2. */
+/* Counts in bins. */
 struct histogram {
     double lo, width;
     uint32_t tally[BINS + 2], *count;   /* count = tally + 1: without what is out of range */
-    int64_t n[BINS + 1], k[BINS + 1], kk[BINS + 1];
+};
+
+/* What the bins lo .. hi-1 hold: number, sum of k, sum of k^2; and where its median was found. */
+struct range {
+    int lo, hi;
+    int64_t n, k, kk;
+    int64_t below;                      /* number in the bins below lo */
+    int at;                             /* a bin, and the number in the bins below it */
+    int64_t below_at;
 };
 
 /* Number, sum and sum of squares of t with |t - centre| <= reach; n is a multiple of LANES. */
@@ -48,23 +56,33 @@ WIDE static void clipped_sums(const double *t, long n, double centre, double rea
  * Centre (minus pivot) and rms of a regular sample by 2-sigma clipping until it
  * stands still; *whole = 1 when the sample has whole numbers below 2^23 only.
  */
+WIDE static void sample_values(const float *restrict p, long n, double pivot, double *restrict t, int *whole)
+{
+    int32_t broken = 0;
+    for (long i = 0; i < n; i++) {
+        t[i] = (double)p[i] - pivot;
+        float near = fabsf(p[i]) < 8388608.0f ? p[i] : 0.5f;
+        broken |= (float)(int32_t)near != near;
+    }
+    *whole = !broken;
+}
+
 static void rough(const float *v, long n, double pivot, double *centre, double *sigma, int *whole)
 {
     double t[SAMPLE + LANES], c = 0, reach = INFINITY, s = 0;
+    float p[SAMPLE];
     long m = n < SAMPLE ? n : SAMPLE;
-    *whole = 1;
     long step = n / m, rest = n % m, at = 0, over = 0;
     for (long i = 0; i < m; i++) {         /* at = i n / m */
-        float p = v[at];
+        p[i] = v[at];
         at += step;
         over += rest;
         if (over >= m) {
             over -= m;
             at++;
         }
-        t[i] = (double)p - pivot;
-        *whole &= fabsf(p) < 8388608.0f && (float)(int)p == p;
     }
+    sample_values(p, m, pivot, t, whole);
     for (long i = 0; m % LANES; i++)       /* repeat a few */
         t[m++] = t[i];
     for (int pass = 0; pass < 30; pass++) {
@@ -99,60 +117,92 @@ WIDE static void bins_of(const float *restrict v, long n, float lo, float scale,
 
 static void histogram_fill(struct histogram *h, const float *v, long n, double centre, double sigma, int whole)
 {
-    enum { PIECE = 1024 };
+    enum { PIECE = 1024, TABLES = 4 };     /* so that equal neighbours do not wait for each other */
     int32_t bin[PIECE];
+    uint32_t tally[TABLES][BINS + 2];
     h->width = 10 * sigma / BINS;
     h->lo = (double)(float)(centre - 5 * sigma);
     if (whole && sigma < 1e5) {
         h->width = ceil(h->width);
         h->lo = floor(centre - h->width * BINS / 2) + 0.5;
     }
-    memset(h->tally, 0, sizeof h->tally);
+    memset(tally, 0, sizeof tally);
     h->count = h->tally + 1;
     for (long i = 0; i < n; i += PIECE) {
-        long m = n - i < PIECE ? n - i : PIECE;
+        long m = n - i < PIECE ? n - i : PIECE, k = 0;
         bins_of(v + i, m, (float)h->lo, (float)(1 / h->width), bin);
-        for (long k = 0; k < m; k++)
-            h->tally[bin[k]]++;
+        for (; k + TABLES <= m; k += TABLES) {
+            tally[0][bin[k]]++;
+            tally[1][bin[k + 1]]++;
+            tally[2][bin[k + 2]]++;
+            tally[3][bin[k + 3]]++;
+        }
+        for (; k < m; k++)
+            tally[0][bin[k]]++;
     }
-    int64_t s0 = 0, s1 = 0, s2 = 0;
-    for (int b = 0; b < BINS; b++) {
-        h->n[b] = s0;
-        h->k[b] = s1;
-        h->kk[b] = s2;
-        int64_t c = h->count[b];
-        s0 += c;
-        s1 += c * b;
-        s2 += c * b * b;
+    for (int b = 0; b < BINS + 2; b++)
+        h->tally[b] = tally[0][b] + tally[1][b] + tally[2][b] + tally[3][b];
+}
+
+/* Add sign times the bins from .. to-1. */
+WIDE static void range_add(struct range *r, const uint32_t *count, int from, int to, int64_t sign)
+{
+    uint64_t n = 0, k = 0, kk = 0;
+    for (int b = from; b < to; b++) {
+        n += count[b];
+        k += (uint64_t)count[b] * (uint32_t)b;
+        kk += (uint64_t)count[b] * (uint32_t)(b * b);
     }
-    h->n[BINS] = s0;
-    h->k[BINS] = s1;
-    h->kk[BINS] = s2;
+    r->n += sign * (int64_t)n;
+    r->k += sign * (int64_t)k;
+    r->kk += sign * (int64_t)kk;
+}
+
+/* All bins, the search for the median to begin in the middle. */
+static struct range range_all(const struct histogram *h)
+{
+    struct range r = {.at = BINS / 2};
+    range_add(&r, h->count, 0, BINS / 2, 1);
+    r.below_at = r.n;
+    range_add(&r, h->count, BINS / 2, BINS, 1);
+    r.hi = BINS;
+    return r;
+}
+
+static void range_cut(struct range *r, const struct histogram *h, int lo, int hi)
+{
+    int64_t before = r->n;
+    range_add(r, h->count, r->lo, lo, -1);
+    r->below += before - r->n;
+    range_add(r, h->count, hi, r->hi, -1);
+    r->lo = lo;
+    r->hi = hi;
 }
 
 /*
- * Median of the bins lo..hi-1 in bin units (bin b has its centre at b): linear
+ * Median of the range in bin units (bin b has its centre at b): linear
  * between the middles of neighbouring occupied bins, so that data with a coarse
  * quantum give the same answer as if spread over it.
  */
-static double histogram_median(const struct histogram *h, int lo, int hi)
+static double range_median(struct range *r, const struct histogram *h)
 {
-    double half = 0.5 * (double)(h->n[lo] + h->n[hi]);
-    int a = lo, b = hi;            /* n[a] <= half < n[b], the last such a */
-    while (b - a > 1) {
-        int m = (a + b) / 2;
-        if ((double)h->n[m] <= half)
-            a = m;
-        else
-            b = m;
-    }
-    double middle = (double)h->n[a] + 0.5 * h->count[a];
+    double half = 0.5 * (double)(r->below + r->below + r->n);
+    int a = r->at;                 /* the last bin with not more than half below it */
+    int64_t below = r->below_at;
+    while (a > r->lo && (a >= r->hi || (double)below > half))
+        below -= h->count[--a];
+    while (a + 1 < r->hi && (double)(below + h->count[a]) <= half)
+        below += h->count[a++];
+    r->at = a;
+    r->below_at = below;
+    double middle = (double)below + 0.5 * h->count[a];
     int step = half >= middle ? 1 : -1, other = a + step;
-    while (other >= lo && other < hi && h->count[other] == 0)
+    while (other >= r->lo && other < r->hi && h->count[other] == 0)
         other += step;
-    if (other < lo || other >= hi)
+    if (other < r->lo || other >= r->hi)
         return a;
-    double there = (double)h->n[other] + 0.5 * h->count[other];
+    /* the bins between are empty */
+    double there = (double)(step > 0 ? below + h->count[a] : below - h->count[other]) + 0.5 * h->count[other];
     return a + (half - middle) / (there - middle) * (other - a);
 }
 
@@ -174,23 +224,22 @@ void background_clip(const float *v, long n, double gain, double removed, double
     struct histogram h;
     histogram_fill(&h, v, n, centre, s, whole);
 
-    int lo = 0, hi = BINS;
+    struct range r = range_all(&h);
     double mean = 0, median = 0, rms = 0;
     for (int pass = 0; pass < 50; pass++) {
-        double m = (double)(h.n[hi] - h.n[lo]);
+        double m = (double)r.n;
         if (!(m > 0))
             return;
-        mean = (double)(h.k[hi] - h.k[lo]) / m;
-        double var = (double)(h.kk[hi] - h.kk[lo]) / m - mean * mean;
+        mean = (double)r.k / m;
+        double var = (double)r.kk / m - mean * mean;
         rms = var > 0 ? sqrt(var) : 0;
-        median = histogram_median(&h, lo, hi);
+        median = range_median(&r, &h);
         int a = clamp_bin(floor(median - 3 * rms + 0.5)), b = clamp_bin(ceil(median + 3 * rms + 0.5));
-        a = a > lo ? a : lo;
-        b = b < hi ? b : hi;
-        if ((a == lo && b == hi) || a >= b)
+        a = a > r.lo ? a : r.lo;
+        b = b < r.hi ? b : r.hi;
+        if ((a == r.lo && b == r.hi) || a >= b)
             break;
-        lo = a;
-        hi = b;
+        range_cut(&r, &h, a, b);
     }
     mean = h.lo + (mean + 0.5) * h.width;
     median = h.lo + (median + 0.5) * h.width;
@@ -251,30 +300,37 @@ struct cells {
     struct darksky *dark;          /* NULL: not asked for */
 };
 
-WIDE static int all_finite(const float *v, long n)
+/* Copy rows of a cell one after the other; 0 when a pixel is not finite (with rms: or has no finite rms). */
+WIDE static int copy_cell(const float *restrict pix, const float *restrict rms, size_t stride, long n, long rows,
+                          float *restrict buf)
 {
     int32_t bad = 0;
-    for (int i = 0; i < (int)n; i++)
-        bad |= !(fabsf(v[i]) <= FLT_MAX);
+    for (long y = 0; y < rows; y++, pix += stride, buf += n) {
+        for (long x = 0; x < n; x++) {
+            buf[x] = pix[x];
+            bad |= !(fabsf(pix[x]) <= FLT_MAX);
+        }
+        if (!rms)
+            continue;
+        for (long x = 0; x < n; x++)
+            bad |= !(rms[x] <= FLT_MAX);
+        rms += stride;
+    }
     return !bad;
 }
 
 /* Copy the good pixels of one cell; returns how many. */
 static long gather(const struct cells *c, long x0, long x1, long y0, long y1, float *buf)
 {
+    size_t stride = (size_t)c->im->nx, at = (size_t)y0 * stride + (size_t)x0;
+    const float *pix = c->im->pix + at, *rms = c->rms_map ? c->rms_map + at : NULL;
+    if (copy_cell(pix, rms, stride, x1 - x0, y1 - y0, buf))
+        return (x1 - x0) * (y1 - y0);
     long n = 0;
-    for (long y = y0; y < y1; y++) {
-        const float *pix = c->im->pix + (size_t)y * (size_t)c->im->nx;
-        const float *rms = c->rms_map ? c->rms_map + (size_t)y * (size_t)c->im->nx : NULL;
-        if (all_finite(pix + x0, x1 - x0) && (!rms || all_finite(rms + x0, x1 - x0))) {
-            memcpy(buf + n, pix + x0, (size_t)(x1 - x0) * sizeof *buf);
-            n += x1 - x0;
-            continue;
-        }
-        for (long x = x0; x < x1; x++)
+    for (long y = y0; y < y1; y++, pix += stride, rms = rms ? rms + stride : NULL)
+        for (long x = 0; x < x1 - x0; x++)
             if (fabsf(pix[x]) <= FLT_MAX && (!rms || rms[x] <= FLT_MAX))
                 buf[n++] = pix[x];
-    }
     return n;
 }
 
