@@ -15,6 +15,36 @@
 
 #define DITHER_MAX 64
 
+/*
+ * Between small pixels the image is taken as band-limited: H at n + f is the
+ * sum of H[n + k] sinc(k - f) under a Kaiser window (beta 12) of DITHER_REACH small
+ * pixels to either side, normalised to sum 1.  Frequencies up to 0.44 cycles
+ * per small pixel pass to 2e-6, slow ones and sums to rounding.
+ */
+enum { DITHER_REACH = 32 };
+
+/* Weights along one axis of the small pixels first .. first + n - 1, counted from the cell's first one. */
+struct dither_axis {
+    int first, n;
+    double w[DITHER_MAX + 2 * DITHER_REACH];
+};
+
+/* Sum of `factor` small pixels moved by `fraction`, 0 <= fraction < 1; 0 gives ones. */
+void dither_sum(int factor, double fraction, struct dither_axis *a);
+
+/*
+ * The same sum of the upper quarter of the band.  What the sampling has folded
+ * into the band is moved wrongly, and is no larger than that where spectra fall.
+ */
+void dither_rest(int factor, struct dither_axis *a);
+
+/* Element i of n, mirrored at both ends. */
+long dither_mirror(long i, long n);
+
+/* out[i] = scale sum_t a->w[t] line[factor i + from + a->first + t], i < side, mirrored in the line of nx; padded has nx + 4 DITHER_REACH + DITHER_MAX doubles. */
+void dither_cells(const struct dither_axis *a, int factor, long from, long nx, long side, const double *line, double scale,
+                  double *padded, double *out);
+
 /* Side of every exposure for n small pixels; 0 when there are too few. */
 long dither_side(long n, int factor);
 

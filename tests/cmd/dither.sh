@@ -61,10 +61,38 @@ near "--offsets: NAXIS" "$($F card l.fits 2 NAXIS1)$($F card l.fits 2 NAXIS2)" 9
 $F dump l.fits 2 >l.txt
 near "--offsets: pixels that differ from direct sums" "$(awk 'NR == FNR { h[$1, $2] = $3; next }
     { x = 2 * $1 + 3; y = 2 * $2 + 1; s = (h[x, y] + h[x + 1, y] + h[x, y + 1] + h[x + 1, y + 1]) / 3; d = s - $3; if (d * d > 1e-12 * s * s) bad++ } END { print bad + 0 }' h.txt l.txt)" 0 0
-printf '# DX DY\n0 0\n0.3 0.5\n' >off.txt
-fails "an offset between small pixels" 1 dither -n 2 --offsets off.txt h.fits -o no.fits
+# negative ones leave out pixels at the beginning of all
 printf '# DX DY\n0 0\n-0.5 0.5\n' >off.txt
-fails "a negative offset" 1 dither -n 2 --offsets off.txt h.fits -o no.fits
+dither -n 2 --offsets off.txt h.fits -o l.fits
+near "negative offset: DITHERX" "$($F card l.fits 2 DITHERX)" -0.5 0
+near "negative offset: CRPIX1" "$($F card l.fits 2 CRPIX1)" "$(awk 'BEGIN { print (10.5 - 1 - 1 - .5) / 2 + 1 }')" 1e-12
+$F dump l.fits 2 >l.txt
+near "negative offset: pixels that differ from direct sums" "$(awk 'NR == FNR { h[$1, $2] = $3; next }
+    { x = 2 * $1 + 1; y = 2 * $2 + 1; s = (h[x, y] + h[x + 1, y] + h[x, y + 1] + h[x + 1, y + 1]) / 2; if (s != $3) bad++ } END { print bad + 0 }' h.txt l.txt)" 0 0
+
+# any offset: shifted as a band-limited image, against renderings of the displaced sky; largest error over the peak
+psfgen --pupil-grid 64 --size 128 -o psf.fits
+printf '# DX DY MAG TYPE\n0.3 0.7 22 star\n-3.1 2.23 21 star\n' >sky.txt
+shifted() { # N DX DY LIMIT: pixels of 0.2", small ones N times smaller
+    awk -v n="$1" -v dx="$2" -v dy="$3" -v CONVFMT=%.12g '/^#/ { print; next } { a = 0.2 * (0.5 - 0.5 / n); print $1 + a - 0.2 * dx, $2 + a - 0.2 * dy, $3, $4 }' sky.txt >moved.txt
+    simage -q sky.txt -p psf.fits -x 0.2 --subpixel "$1" --size $((60 * $1 + $1 - 1)),$((60 * $1 + $1 - 1)) --accuracy 1e-7 -o small.fits
+    simage -q moved.txt -p psf.fits -x 0.2 --size 60,60 --accuracy 1e-7 -o direct.fits
+    printf '# DX DY\n%s %s\n' "$2" "$3" >off.txt
+    dither -v -n "$1" --offsets off.txt small.fits -o moved.fits 2>log.txt
+    near "shift by $2, $3 of $1 small pixels a pixel: error over the peak" "$(pix diff "moved.fits[SCI,1]" direct.fits | cut -d' ' -f1)" 0 "$4"
+}
+shifted 8 .13 .41 1e-6
+shifted 8 .06 0 1e-6
+shifted 4 .13 .41 2e-4
+between "its error is told, and is no smaller" "$(sed -n 's/.*right to about \([0-9.e-]*\) of.*/\1/p' log.txt)" 9e-5 1e-2
+shifted 2 .13 .41 0.06
+grep -q "may be wrong by" log.txt && pass "small pixels that are too large: $(cut -c1-120 log.txt | tail -1)" || fail "no warning at small pixels of 0.1 arcsec"
+near "shifted: CRPIX1" "$($F card moved.fits 1 CRPIX1)" "$(awk 'BEGIN { print (61 - 1 - 0.26 - .5) / 2 + 1 }')" 1e-9
+$F make one.fits 200 200 3 "${cards[@]}"
+dither -n 2 --offsets off.txt one.fits -o c.fits
+near "a constant stays one, to the border" "$($F stat c.fits 1 | awk '{ print $4 - $3 }')" 0 1e-5
+printf '# DX DY\n0 0\n3e6 0\n' >off.txt
+fails "an offset beyond 1e6 small pixels" 1 dither -n 2 --offsets off.txt h.fits -o no.fits
 
 $F make small.fits 8 8 1
 fails "too few pixels" 1 dither -n 5 small.fits -o no.fits
