@@ -86,6 +86,18 @@ for o in "--jitter 0.03" "--ipc 0.01" "--pixel 0.12,0.08" "--pixel-edge 0.04,0.0
     simage o.txt -p psf.fits $S --accuracy 1e-6 $o --method field -o whole.fits
     near "$o: stamps and field, of the peak" "$(pix diff stamps.fits whole.fits | cut -d' ' -f1)" 0 2e-6
 done
+# a width that tends to none: differences fall as its square
+simage o.txt -p psf.fits $S --accuracy 1e-7 -o none.fits
+for o in diffusion jitter; do
+    for s in 0.004 0.002 1e-5; do
+        simage o.txt -p psf.fits $S --accuracy 1e-7 --$o $s -o some.fits
+        pix diff none.fits some.fits | cut -d' ' -f1 >"d$s"
+    done
+    between "$o of 0.004\" over 0.002\": difference from none" "$(awk -v a="$(cat d0.004)" -v b="$(cat d0.002)" 'BEGIN { print a / b }')" 3.8 4.1
+    near "$o of 1e-5\": of the peak" "$(cat d1e-5)" 0 3e-7
+done
+psfgen --diffusion 0 --pixel 0.1 $PSF epsf.fits
+fails "edges on a PSF with a pixel" 1 simage o.txt -p epsf.fits $S --pixel-edge 0.01,0 -o no.fits
 fails "edges longer than the pixel" 2 simage o.txt -p psf.fits $S --pixel-edge 0.11,0 -o no.fits
 fails "edges without a PSF" 2 simage o.txt $S --pixel-edge 0.01,0 -o no.fits
 fails "edges and --no-pixel" 2 simage o.txt -p psf.fits $S --no-pixel --pixel-edge 0.01,0 -o no.fits

@@ -46,6 +46,7 @@ ext=
 sweep psfgen psfgen --pupil-grid 64 --size 32
 sweep galgen galgen --field 12 -n 30 --stars
 sweep simage simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 60,60
+sweep simage simage scene.txt --models models.txt -x 0.1 --wcs true.fits
 sweep dither dither -n 2 half.fits
 sweep addnoise addnoise --depth 27.7 true.fits
 sweep drizzle drizzle dith.fits -x 0.1 --pixfrac 0.5

@@ -172,8 +172,8 @@ fails "--force without a file" 2 psfgen --force -o no.fits
 ok "one sample" psfgen --size 1 -o one.fits
 ok "even side" psfgen --size 100 -o even.fits
 near "even: centre between samples" "$(card even.fits CRPIX1)" 50.5 0
-ok "obscuration 0" psfgen --obscuration 0 -n 64 -o o0.fits
-ok "obscuration 0.99" psfgen --obscuration 0.99 -n 64 -o o99.fits
+# a thin ring is J0(.995 pi D r / lambda)^2: half at 1.12638 (an obscuration of 0 is the Airy disc above)
+near "obscuration 0.99: FWHM" "$(fwhm --obscuration 0.99 --struts 0 --diffusion 0)" 0.060947 0.00001
 fails "obscuration 1" 1 psfgen --obscuration 1 -o no.fits
 fails "vanes that cover everything" 1 psfgen --strut-width 5 -o no.fits
 fails "core far below a sample" 1 psfgen --wavelength 5 --diffusion 0 --size 9 -o no.fits
