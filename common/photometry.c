@@ -263,8 +263,16 @@ static struct aperture_sum ellipse_sum(const struct field *f, const struct stamp
     return t;
 }
 
+/* Variance of sums of sky over that of independent pixels. */
+static double correlation(const struct field *f)
+{
+    return f->p->noise_cor > 0 ? f->p->noise_cor * f->p->noise_cor : 1;
+}
+
+/* variance: the sum over pixels of the sky's. */
 static double flux_error(const struct field *f, double variance, double flux)
 {
+    variance *= correlation(f);
     if (f->p->gain > 0 && flux > 0)
         variance += flux / f->p->gain;
     return sqrt(variance);
@@ -531,9 +539,9 @@ static void from_blob(const struct field *f, const struct blob *b, struct object
         o->flags |= DETECT_EDGE;
     if (b->peak + o->background >= f->p->saturation)
         o->flags |= DETECT_SATURATED;
-    /* errors of the centroid sum f x / sum f for independent pixels of variance rms^2 + f/gain */
+    /* errors of the centroid sum f x / sum f for pixels of variance rms^2 + f/gain, the sky's correlated over less than an object */
     double photon = f->p->gain > 0 ? 1 / f->p->gain : 0, n = (double)b->n;
-    double v = rms * rms * n / (b->s * b->s) + photon / b->s;
+    double v = correlation(f) * rms * rms * n / (b->s * b->s) + photon / b->s;
     o->err_xx = v * o->xx;
     o->err_xy = v * o->xy;
     o->err_yy = v * o->yy;

@@ -32,6 +32,7 @@ struct photometry_params {
     double gain;               /* electrons per unit; 0: no photon noise of the objects */
     double noise;              /* rms per pixel where rms_map is NULL */
     const float *rms_map;      /* or NULL */
+    double noise_cor;          /* sky noise of large areas over what pixels let expect (NOISECOR); 0 counts as 1 */
     double saturation;         /* level in the image's unit, INFINITY: none */
     double flux_fraction;      /* of FLUX_RADIUS, 0.5 */
     size_t nfractions;         /* more fractions for FLUX_RADIUS_2, ... */

@@ -376,3 +376,18 @@ for k in "--pixfrac 0" "--pixfrac 1e-9" "--kernel turbo --pixfrac 0" "--kernel p
     [ "$k" = "--pixfrac 0" ] && cp k.txt points.txt
     same "$k: points" k.txt points.txt
 done
+
+# ---- NOISECOR in detect: errors of sums over the sky grow by it, positions do not move
+blob='100 * exp(-(($x - 50) ** 2 + ($y - 48) ** 2) / 18) + (($x * 7919 + $y * 104729) % 1009) / 250'
+$F make plain.fits 100 100 "$blob"; $F make corr.fits 100 100 "$blob" "NOISECOR=                  2.4"
+for f in plain corr; do detect -q --gain 0 $f.fits --columns +FLUXERR_ISO,ERRX2_IMAGE -o $f.cat; done
+for c in FLUXERR_AUTO FLUXERR_ISO; do near "NOISECOR 2.4: $c" "$(paste <(col corr.cat $c) <(col plain.cat $c) | awk 'NR == 1 { print $1 / $2 }')" 2.4 1e-5; done
+near "NOISECOR 2.4: FLUX_AUTO stays" "$(col corr.cat FLUX_AUTO | head -1)" "$(col plain.cat FLUX_AUTO | head -1)" 0
+# the spread of fluxes of equal stars in a stack of correlated noise, over FLUXERR_AUTO
+awk 'BEGIN { print "# DX DY MAG TYPE"; for (j = 0; j < 20; j++) for (i = 0; i < 20; i++) printf "%.3f %.3f 23 star\n", (i - 9.5) * 3 + (i * 7 + j * 3) % 10 * 0.02, (j - 9.5) * 3 + (i * 3 + j * 7) % 10 * 0.02 }' >stars.txt
+psfgen --pupil-grid 64 --size 64 -o psf.fits
+simage -q stars.txt -p psf.fits -x 0.2 --subpixel 2 --size 641,641 --accuracy 1e-5 -o stars.fits
+dither -n 2 stars.fits | addnoise --depth 26.5 | drizzle -x 0.1 --pixfrac 1 --flat -o stack.fits
+detect -q --threshold 5 stack.fits -o stack.cat
+near "stack of pixfrac 1: NOISECOR" "$($F card stack.fits 0 NOISECOR)" 2.4 1e-9
+between "stack of pixfrac 1: spread of the fluxes of 400 stars over their FLUXERR_AUTO" "$(paste -d' ' <(col stack.cat FLUX_AUTO) <(col stack.cat FLUXERR_AUTO) | sort -g | awk '{ f[NR] = $1; e += $2 } END { lo = int(NR * 0.16) + 1; hi = int(NR * 0.84); printf "%.3f", (f[hi] - f[lo]) / 2 / (e / NR) }')" 0.85 1.3
