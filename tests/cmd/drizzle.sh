@@ -79,6 +79,11 @@ drizzle e3.fits e1.fits e4.fits e2.fits -x 0.07 --pixfrac 0.9 -o o2.fits
 same "order of the operands" o1.fits o2.fits
 drizzle -j 2 e1.fits e2.fits e3.fits e4.fits -x 0.07 --pixfrac 0.9 -o o2.fits
 same "1 and 2 threads" o1.fits o2.fits
+# the key of the noise does not depend on which exposure comes first
+near "NOISSEED: one for all" "$($F card o1.fits 1 NOISSEED)" 3 0
+for e in 1 2 3; do addnoise -q -s 1$e "four.fits[SCI,$e]" -o k$e.fits; done
+drizzle k1.fits k2.fits k3.fits -o k.fits
+near "NOISSEED: the sum of three" "$($F card k.fits 1 NOISSEED)" 36 0
 # lists of operands
 printf '# exposures\n e2.fits\ne1.fits \n\n' >two.lst; printf 'e4.fits\n' >rest.lst
 drizzle @two.lst e3.fits @rest.lst -x 0.07 --pixfrac 0.9 -o o2.fits
