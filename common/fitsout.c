@@ -419,11 +419,49 @@ int fits_out_slot_rows(struct fits_out *f, int slot, long z, long y0, long nrow,
     return OK;
 }
 
+/* An image that goes block by block from memory to a stream, and the zeros behind it. */
+struct whole {
+    struct fits_out *f;
+    const char *in;
+    size_t left, pad;      /* pixels, bytes */
+};
+
+static size_t next_block(void *state, const void **p)
+{
+    struct whole *w = state;
+    size_t n = w->left < BLOCK / sizeof(float) ? w->left : BLOCK / sizeof(float), pad = w->pad;
+    if (n == 0) {
+        *p = zeros;
+        w->pad = 0;
+        return pad;
+    }
+    swap32(w->f->block, w->in, n);
+    w->in += n * sizeof(float);
+    w->left -= n;
+    *p = w->f->block;
+    return n * sizeof(float);
+}
+
+/* All rows of the only HDU; to a stream without a spool, the checksums being known before the first byte goes. */
+static int put_whole(struct fits_out *f, const struct image *im, struct whole *w, struct err *e)
+{
+    struct part *p = &f->now;
+    size_t n = image_count(im);
+    if (!outfile_is_stream(f->o))
+        return fits_out_rows(f, im->ny, im->pix, e);
+    *w = (struct whole){.f = f, .in = (const char *)im->pix, .left = n, .pad = padding(p)};
+    for (size_t at = 0; at < n; at += BLOCK / sizeof(float))
+        swap_block(f, p, (const char *)(im->pix + at), n - at < BLOCK / sizeof(float) ? n - at : BLOCK / sizeof(float));
+    outfile_follow(f->o, next_block, w);
+    return seal(f, p, e);
+}
+
 int image_write(const struct image *im, const char *name, const char *record,
                 const char *const *inputs, size_t n_inputs, struct err *e)
 {
     struct header h = {0};
     struct fits_out *f;
+    struct whole whole;
     int st = header_copy(&h, &im->hdr);
     if (st == OK && record)
         st = header_history(&h, record);
@@ -437,7 +475,7 @@ int image_write(const struct image *im, const char *name, const char *record,
     }
     st = fits_out_hdu(f, -32, im->nx, im->ny, 1, &h, e);
     if (st == OK)
-        st = fits_out_rows(f, im->ny, im->pix, e);
+        st = put_whole(f, im, &whole, e);
     header_free(&h);
     if (st == OK)
         return fits_out_commit(f, e);

@@ -39,6 +39,8 @@ struct outfile {
     size_t n, cap, limit;
     uint64_t base;
     int status, why;       /* first failure and its errno */
+    size_t (*more)(void *state, const void **p);   /* NULL: nothing follows */
+    void *state;
 };
 
 /*
@@ -415,6 +417,17 @@ int outfile_patch(struct outfile *o, uint64_t offset, const void *buf, size_t n)
     return OK;
 }
 
+int outfile_is_stream(const struct outfile *o)
+{
+    return o->stream;
+}
+
+void outfile_follow(struct outfile *o, size_t (*more)(void *state, const void **p), void *state)
+{
+    o->more = more;
+    o->state = state;
+}
+
 uint64_t outfile_size(const struct outfile *o)
 {
     return o->base + o->n;
@@ -445,6 +458,16 @@ static int copy_out(struct outfile *o, int fd)
     return bad ? -1 : 0;
 }
 
+/* What follows. */
+static int copy_more(struct outfile *o, int fd)
+{
+    const void *p;
+    int bad = 0;
+    for (size_t n; o->more && !bad && (n = o->more(o->state, &p)) > 0;)
+        bad = file_write(fd, p, n);
+    return bad;
+}
+
 /* fsync, where the object can be synced at all. */
 static int sync_fd(int fd)
 {
@@ -472,7 +495,7 @@ static int commit_stream(struct outfile *o, struct err *e)
     off_t start = -1;                         /* where a regular file is cut again on failure */
     if (S_ISREG(sb.st_mode))
         start = fcntl(fd, F_GETFL) & O_APPEND ? sb.st_size : lseek(fd, 0, SEEK_CUR);
-    int bad = copy_out(o, fd) || sync_fd(fd), why = errno;
+    int bad = copy_out(o, fd) || copy_more(o, fd) || sync_fd(fd), why = errno;
     if (bad && start >= 0 && ftruncate(fd, start) == 0)
         lseek(fd, start, SEEK_SET);
     if (close(fd) && !bad && errno != EINTR) {

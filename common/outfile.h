@@ -41,6 +41,16 @@ MUST_CHECK int outfile_skip(struct outfile *o, uint64_t n);
 /* Overwrite bytes already appended (FITS headers whose checksums come last). */
 MUST_CHECK int outfile_patch(struct outfile *o, uint64_t offset, const void *buf, size_t n);
 
+/* 1 when the target gets its bytes at commit: standard output, a device, a FIFO. */
+int outfile_is_stream(const struct outfile *o);
+
+/*
+ * Bytes that a stream gets at commit after those appended, straight from the
+ * caller's memory: `more` points *p to the next bytes and tells how many there
+ * are, 0 at the end.  It must not fail.  Nothing may be appended afterwards.
+ */
+void outfile_follow(struct outfile *o, size_t (*more)(void *state, const void **p), void *state);
+
 /* Bytes appended so far. */
 uint64_t outfile_size(const struct outfile *o);
 
