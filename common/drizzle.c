@@ -305,6 +305,13 @@ static inline long below(double v)
     return i - (v < (double)i);
 }
 
+/* Least whole number that is not below v, 0 <= v < 2^31. */
+static inline int above(double v)
+{
+    const int i = (int)v;
+    return i + (v > (double)i);
+}
+
 /* Cells that an interval of this length can touch. */
 static int cells(double length)
 {
@@ -354,6 +361,7 @@ struct batch {
     int n, nx, ny;
     struct drop drop[OVERLAP_LANES];
     long i0[OVERLAP_LANES], j0[OVERLAP_LANES];           /* corner of the window */
+    int wide[OVERLAP_LANES], high[OVERLAP_LANES];        /* cells of it that the drop touches, from there on */
     double fx[OVERLAP_LANES], fy[OVERLAP_LANES];         /* centre in the window, of a shape */
     double x[OVERLAP_LANES];                             /* input pixel, of a grid's drop */
     double X[4][OVERLAP_LANES], Y[4][OVERLAP_LANES];     /* its corners */
@@ -416,7 +424,9 @@ static void flush(struct job *j, struct batch *t)
         }
         const size_t at = (size_t)r * (size_t)b->nx + (size_t)i, stride = (size_t)b->nx;
         double *sum = b->sum + 2 * at;
-        if (t->nx == 3 && t->ny == 3)
+        if (t->nx == 2 && t->ny == 2)
+            spread(sum, 2 * stride, t->area + l, 2, 2, p);
+        else if (t->nx == 3 && t->ny == 3)
             spread(sum, 2 * stride, t->area + l, 3, 3, p);
         else if (t->nx == 4 && t->ny == 4)
             spread(sum, 2 * stride, t->area + l, 4, 4, p);
@@ -441,8 +451,16 @@ WIDE static void place(const struct shape *s, struct batch *t)
             to->by[k][i] = t->fy[i] + e->by[k][i];
         }
     }
-    t->nx = s->nx;
-    t->ny = s->ny;
+}
+
+/* The smallest window that holds all drops of a batch. */
+static void fit_window(struct batch *t)
+{
+    t->nx = t->ny = 2;
+    for (int l = 0; l < t->n; l++) {
+        t->nx = t->wide[l] > t->nx ? t->wide[l] : t->nx;
+        t->ny = t->high[l] > t->ny ? t->high[l] : t->ny;
+    }
 }
 
 /* Pixels lo..hi of one row, an affine map; centre and corners are rounded apart, so that all drops have one shape. */
@@ -465,13 +483,16 @@ static void row_shapes(struct job *j, const struct shape *s, struct batch *t, lo
         t->j0[l] = below(Y + s->y0);
         t->fx[l] = X - (double)t->i0[l];
         t->fy[l] = Y - (double)t->j0[l];
+        t->wide[l] = above(t->fx[l] + s->x1);
+        t->high[l] = above(t->fy[l] + s->y1);
         if (++t->n == OVERLAP_LANES) {
             place(s, t);
+            fit_window(t);
             flush(j, t);
         }
     }
-    if (t->n)
-        place(s, t);
+    place(s, t);
+    fit_window(t);
     flush(j, t);
 }
 
@@ -551,7 +572,6 @@ static void frame(struct batch *t)
 {
     double x[4][OVERLAP_LANES], y[4][OVERLAP_LANES], factor[OVERLAP_LANES];
     double (*X)[OVERLAP_LANES] = t->X, (*Y)[OVERLAP_LANES] = t->Y;
-    t->nx = t->ny = 2;
     for (int i = 0; i < t->n; i++) {
         const double area = 0.5 * ((X[2][i] - X[0][i]) * (Y[3][i] - Y[1][i]) - (X[3][i] - X[1][i]) * (Y[2][i] - Y[0][i]));
         const double x0 = least4(X[0][i], X[1][i], X[2][i], X[3][i]), x1 = most4(X[0][i], X[1][i], X[2][i], X[3][i]);
@@ -566,11 +586,10 @@ static void frame(struct batch *t)
             x[k][i] = t->odd[i] ? 0 : X[k][i] - fi;
             y[k][i] = t->odd[i] ? 0 : Y[k][i] - fj;
         }
-        if (!t->odd[i]) {
-            t->nx = wide > t->nx ? (int)(wide + 0.9999999) : t->nx;
-            t->ny = high > t->ny ? (int)(high + 0.9999999) : t->ny;
-        }
+        t->wide[i] = t->odd[i] ? 2 : above(wide);
+        t->high[i] = t->odd[i] ? 2 : above(high);
     }
+    fit_window(t);
     for (int i = t->n; i < OVERLAP_LANES; i++) {
         factor[i] = 0;
         for (int k = 0; k < 4; k++)
