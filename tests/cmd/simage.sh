@@ -227,7 +227,7 @@ if [ -d "$T" ]; then
                     open my $m, ">", "tm.txt"; print $m "# ID BETA NMAX MAG COEFFS\n1 $k{BETA} $k{NMAX} 20"; printf $m " %.17g", $k{"C$_"} for 0 .. ($k{NMAX} + 1) * ($k{NMAX} + 2) / 2 - 1; print $m "\n";
                     my $g = sqrt($k{GAMMA1} ** 2 + $k{GAMMA2} ** 2); my $f = $g > 0 ? (exp(2 * $g) - 1) / (exp(2 * $g) + 1) / $g : 0;
                     open my $s, ">", "ts.txt"; printf $s "# DX DY FLUX TYPE MODEL G1 G2\n%.17g %.17g 1 shapelet 1 %.17g %.17g\n", $k{OFFX}, $k{OFFY}, $f * $k{GAMMA1}, $f * $k{GAMMA2}'
-                psf= requests=1e-7
+                psf='' requests=1e-7
                 [ $kind = psf ] && psf="-p $T/psf_chpsf_0.01.fits.gz --psf-scale 0.01 --psf-cutoff 11.9" requests="1e-2 1e-3 1e-4 1e-5 1e-6 1e-7"
               for eps in $requests; do
                 simage ts.txt --models tm.txt -x $x --size 64,64 -T 1 --accuracy $eps $psf -q -o t.fits
