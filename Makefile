@@ -119,6 +119,9 @@ paper: $(filter deps,$(MAKECMDGOALS))    # the whole experiment of High et al. (
 calibration: all    # how good the shears are: slopes and biases with errors on 24 fields; half an hour
 	$(MAKE) -C examples/calibration
 
+dithers: all    # what imperfect dithers cost: noise, galaxies, slopes against drop size; four minutes
+	$(MAKE) -C examples/dithers
+
 deps:    # install the compiler, the libraries and the plotter (Debian, Ubuntu)
 	@tests/deps
 
@@ -143,9 +146,10 @@ clean:    # remove everything that was built
 	rm -rf build bin
 	$(MAKE) -s -C examples/pixelscale clean
 	$(MAKE) -s -C examples/calibration clean
+	$(MAKE) -s -C examples/dithers clean
 	$(MAKE) -s -C examples/accuracy clean
 
 help:    # this list
 	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all layers check check-large sanitize tsan fuzz coverage lint bench accuracy quick paper calibration deps deps-slurm install uninstall clean help FORCE
+.PHONY: all layers check check-large sanitize tsan fuzz coverage lint bench accuracy quick paper calibration dithers deps deps-slurm install uninstall clean help FORCE

@@ -182,8 +182,10 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
     p.threads = c->threads;
     p.clean = !o->no_clean;
     p.phot.gain = f->gain;
+    p.phot.noise_cor = header_double_or(h, "NOISECOR", 1);
     p.phot.saturation = opt_given(own, c, "saturation") ? o->saturation : header_double_or(h, "SATURATE", INFINITY);
     p.phot.windowed = detectcat_windowed(o->columns);
+    p.phot.errors = detectcat_errors(o->columns);
     p.phot.plain_sizes = !detectcat_sizes(o->columns);
     if (o->fractions.n) {
         p.phot.flux_fraction = o->fractions.v[0];

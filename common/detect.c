@@ -306,7 +306,9 @@ static int measure_all(const struct image *im, const float *map, int relative, c
     d->aperture = malloc((all->n * (2 * phot.napertures + phot.nfractions) + 1) * sizeof *d->aperture);
     if (!d->object || !d->aperture)
         return E_NOMEM;
-    struct measuring t = {{im, &d->background, &d->label, &phot, 0}, all, d, p->progress, DETECT_STEPS / 2};
+    struct photometry_params here = phot;
+    struct field found = {im, &d->background, &d->label, &here, NULL};
+    struct measuring t = {{im, &d->background, &d->label, &phot, NULL}, all, d, p->progress, DETECT_STEPS / 2};
     if (p->measure) {
         struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads, p->dark_sky};
         int st = background_measure(&d->measured, p->measure, p->measure_map, &bp);
@@ -316,7 +318,7 @@ static int measure_all(const struct image *im, const float *map, int relative, c
             return st;
         phot.noise = d->measured.mean_rms;
         phot.rms_map = p->measure_map;
-        t.f = (struct field){p->measure, &d->measured, &d->label, &phot, 1};
+        t.f = (struct field){p->measure, &d->measured, &d->label, &phot, &found};
     }
     return par_for((long)all->n, OBJECTS, p->threads, measure_objects, &t);
 }

@@ -130,6 +130,15 @@ int detectcat_windowed(const char *columns)
     return columns && (strstr(columns, "XWIN_IMAGE") || strstr(columns, "YWIN_IMAGE"));
 }
 
+int detectcat_errors(const char *columns)
+{
+    static const char *const name[] = {"ERRX2_", "ERRY2_", "ERRXY_", "ERRA_", "ERRB_", "ERRTHETA_"};
+    int any = 0;
+    for (size_t k = 0; columns && k < sizeof name / sizeof *name; k++)
+        any |= strstr(columns, name[k]) != NULL;
+    return any;
+}
+
 int detectcat_sizes(const char *columns)
 {
     return !columns || *columns == '+' || strstr(columns, "FWHM_IMAGE") || strstr(columns, "STAR_PROB");

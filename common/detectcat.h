@@ -33,6 +33,9 @@ int detectcat_unknown(const char *columns, char name[64]);
 /* 1 when the list asks for XWIN_IMAGE or YWIN_IMAGE. */
 int detectcat_windowed(const char *columns);
 
+/* 1 when the list asks for errors of positions. */
+int detectcat_errors(const char *columns);
+
 /* 1 when FWHM_IMAGE or STAR_PROB will be there. */
 int detectcat_sizes(const char *columns);
 

@@ -263,8 +263,16 @@ static struct aperture_sum ellipse_sum(const struct field *f, const struct stamp
     return t;
 }
 
+/* Variance of sums of sky over that of independent pixels. */
+static double correlation(const struct field *f)
+{
+    return f->p->noise_cor > 0 ? f->p->noise_cor * f->p->noise_cor : 1;
+}
+
+/* variance: the sum over pixels of the sky's. */
 static double flux_error(const struct field *f, double variance, double flux)
 {
+    variance *= correlation(f);
     if (f->p->gain > 0 && flux > 0)
         variance += flux / f->p->gain;
     return sqrt(variance);
@@ -433,7 +441,7 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
 
 /*
  * Windowed centroid (Bertin's XWIN): Gaussian of FWHM = twice the half-light
- * radius, steps of twice the offset until it moves less than 2e-4 px.
+ * radius, at least 2 px, steps of twice the offset until it moves less than 2e-4 px.
  */
 static void window_centroid(const struct stamp *s, double sigma, double *line, double *cx, double *cy)
 {
@@ -531,12 +539,40 @@ static void from_blob(const struct field *f, const struct blob *b, struct object
         o->flags |= DETECT_EDGE;
     if (b->peak + o->background >= f->p->saturation)
         o->flags |= DETECT_SATURATED;
-    /* errors of the centroid sum f x / sum f for independent pixels of variance rms^2 + f/gain */
-    double photon = f->p->gain > 0 ? 1 / f->p->gain : 0, n = (double)b->n;
-    double v = rms * rms * n / (b->s * b->s) + photon / b->s;
-    o->err_xx = v * o->xx;
-    o->err_xy = v * o->xy;
-    o->err_yy = v * o->yy;
+}
+
+/*
+ * Errors of the centroid sum g x / sum g, g the filtered image: sum of
+ * (x - centroid)^2 times the variance rms^2 + f/gain of a pixel, over
+ * (sum g)^2; the sky's noise is correlated over less than an object.  On one
+ * line of pixels a pixel's width is added.
+ */
+static void position_errors(const struct field *f, const struct blob *b, int32_t own, struct object *o)
+{
+    enum { PIECE = 64 };
+    const struct labels *l = f->label;
+    double photon = f->p->gain > 0 ? 1 / f->p->gain : 0, cor = correlation(f), rms2 = f->p->noise * f->p->noise, s[4] = {0};
+    for (long y = b->ymin; y <= b->ymax; y++)
+        for (size_t i = labels_from(l, y, b->xmin); i < l->row[y + 1] && l->run[i].x0 <= b->xmax; i++)
+            for (long x = l->run[i].x0; x < l->run[i].x1 && l->run[i].label == own; x += PIECE) {
+                float v[PIECE];
+                long n = l->run[i].x1 - x < PIECE ? l->run[i].x1 - x : PIECE;
+                size_t at = (size_t)y * (size_t)f->im->nx + (size_t)x;
+                background_subtract(f->b, f->im->pix + at, y, x, n, 0, v);
+                for (long k = 0; k < n; k++) {
+                    double rms = f->p->rms_map ? (double)f->p->rms_map[at + (size_t)k] : 0;
+                    double var = cor * (f->p->rms_map ? rms * rms : rms2) + (v[k] > 0 ? (double)v[k] * photon : 0);
+                    double dx = (double)(x + k) - o->x, dy = (double)y - o->y;
+                    s[0] += var * dx * dx;
+                    s[1] += var * dx * dy;
+                    s[2] += var * dy * dy;
+                    s[3] += var / 12;
+                }
+            }
+    double line = s[0] * s[2] - s[1] * s[1] < s[3] * s[3] ? s[3] : 0;
+    o->err_xx = (s[0] + line) / (b->s * b->s);
+    o->err_xy = s[1] / (b->s * b->s);
+    o->err_yy = (s[2] + line) / (b->s * b->s);
 }
 
 /* A bad pixel inside or next to the isophote. */
@@ -598,11 +634,11 @@ static int measure_auto(const struct field *f, int32_t own, struct photometry_wo
     return OK;
 }
 
-/* FLUX_RADIUS and its further fractions into more[]. */
-static int measure_radii(const struct field *f, struct photometry_work *w, struct object *o, double *more)
+/* FLUX_RADIUS, its further fractions into more[], and that of half the flux. */
+static int measure_radii(const struct field *f, struct photometry_work *w, struct object *o, double *more, double *half)
 {
     const struct stamp *s = &w->stamp;
-    o->flux_radius = sqrt(o->a * o->b);
+    o->flux_radius = *half = sqrt(o->a * o->b);
     for (size_t k = 0; k < f->p->nfractions; k++)
         more[k] = o->flux_radius;
     if (!(o->flux_auto > 0))
@@ -612,6 +648,8 @@ static int measure_radii(const struct field *f, struct photometry_work *w, struc
         st = growth_radius(w->growth, f->p->flux_fraction * o->flux_auto, &o->flux_radius);
     for (size_t k = 0; k < f->p->nfractions && !st; k++)
         st = growth_radius(w->growth, f->p->fraction[k] * o->flux_auto, &more[k]);
+    if (!st && f->p->windowed)
+        st = growth_radius(w->growth, 0.5 * o->flux_auto, half);
     return st;
 }
 
@@ -622,7 +660,8 @@ static int measure_sizes(const struct field *f, struct photometry_work *w, struc
     o->xwin = o->x;
     o->ywin = o->y;
     o->star_prob = 0.5;
-    int st = measure_radii(f, w, o, more);
+    double half;
+    int st = measure_radii(f, w, o, more, &half);
     if (!st)
         st = grow(&w->line, &w->cap_line, 5 * (size_t)(s->nx + s->ny + LANES), sizeof *w->line);
     if (st)
@@ -636,7 +675,7 @@ static int measure_sizes(const struct field *f, struct photometry_work *w, struc
     }
     if (f->p->windowed) {
         double cx = s->cx, cy = s->cy;
-        window_centroid(s, 2 * o->flux_radius / FWHM_SIGMA, line, &cx, &cy);
+        window_centroid(s, 2 * (half > 1 ? half : 1) / FWHM_SIGMA, line, &cx, &cy);
         o->xwin = cx + (double)s->x0;
         o->ywin = cy + (double)s->y0;
     }
@@ -688,8 +727,10 @@ int photometry_measure(const struct field *f, const struct blob *blob, int32_t i
                        struct photometry_work *w, struct object *out, double *aperture)
 {
     struct object o = {0};
-    struct blob here = f->again ? sum_again(f, blob, index + 1) : *blob;
+    struct blob here = f->found ? sum_again(f, blob, index + 1) : *blob;
     from_blob(f, &here, &o);
+    if (f->p->errors)
+        position_errors(f->found ? f->found : f, blob, index + 1, &o);
     int st = measure_auto(f, index + 1, w, &o);
     if (!st)
         st = measure_sizes(f, w, &o, aperture ? aperture + 2 * f->p->napertures : NULL);

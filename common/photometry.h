@@ -32,6 +32,7 @@ struct photometry_params {
     double gain;               /* electrons per unit; 0: no photon noise of the objects */
     double noise;              /* rms per pixel where rms_map is NULL */
     const float *rms_map;      /* or NULL */
+    double noise_cor;          /* sky noise of large areas over what pixels let expect (NOISECOR); 0 counts as 1 */
     double saturation;         /* level in the image's unit, INFINITY: none */
     double flux_fraction;      /* of FLUX_RADIUS, 0.5 */
     size_t nfractions;         /* more fractions for FLUX_RADIUS_2, ... */
@@ -40,6 +41,7 @@ struct photometry_params {
     const double *aperture;    /* diameters, pixels */
     double psf_fwhm;           /* pixels, of the PSF before the pixel; 0 unknown: STAR_PROB 0.5 */
     int windowed;              /* also XWIN, YWIN */
+    int errors;                /* also the errors of the position */
     int plain_sizes;           /* leave out FWHM and STAR_PROB */
 };
 
@@ -60,7 +62,8 @@ struct field {
     const struct background *b;
     const struct labels *label;
     const struct photometry_params *p;
-    int again;                 /* this is not the image of the detection: isophotes are summed here */
+    const struct field *found; /* of the image of the detection, when that is another: isophotes are summed
+                                  here, errors of positions there; else NULL */
 };
 
 struct photometry_work;        /* scratch of one thread */

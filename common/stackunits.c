@@ -145,6 +145,28 @@ static int set_system(const struct stack *s, struct header *h)
     return st;
 }
 
+/* Key of the noise: that of all exposures, else the sum of theirs, which no order changes; none where one is missing. */
+static int set_noise_key(const struct stack *s, struct header *h)
+{
+    unsigned long long sum = 0, first = 0;
+    char text[32];
+    int same = 1;
+    for (size_t i = 0; i < s->n; i++) {
+        if (header_str(&s->shot[i].x.hdr, "NOISSEED", text, sizeof text)) {
+            header_remove(h, "NOISSEED");
+            return OK;
+        }
+        const unsigned long long key = strtoull(text, NULL, 10);
+        first = i ? first : key;
+        same &= key == first;
+        sum += key;
+    }
+    if (same)
+        return OK;
+    snprintf(text, sizeof text, "%llu", sum);
+    return header_set_str(h, "NOISSEED", text, "sum of the seeds of the exposures' noise");
+}
+
 int stack_describe(struct stack *s, const char *record, struct err *e)
 {
     static const char *const gone[] = {"DITHERX", "DITHERY", "EXPNUM", "EXTNAME", "EXTVER", "SKYLEVEL", "SATURATE"};
@@ -153,6 +175,7 @@ int stack_describe(struct stack *s, const char *record, struct err *e)
     for (size_t i = 0; i < sizeof gone / sizeof *gone; i++)
         header_remove(h, gone[i]);
     int st = set_system(s, h);
+    set(&st, set_noise_key(s, h));
     if (!isnan(level))
         set(&st, header_set_double(h, "SKYLEVEL", level, "mean sky and dark per pixel, BUNIT"));
     if (!isnan(full))

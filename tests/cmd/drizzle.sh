@@ -79,6 +79,11 @@ drizzle e3.fits e1.fits e4.fits e2.fits -x 0.07 --pixfrac 0.9 -o o2.fits
 same "order of the operands" o1.fits o2.fits
 drizzle -j 2 e1.fits e2.fits e3.fits e4.fits -x 0.07 --pixfrac 0.9 -o o2.fits
 same "1 and 2 threads" o1.fits o2.fits
+# the key of the noise does not depend on which exposure comes first
+near "NOISSEED: one for all" "$($F card o1.fits 1 NOISSEED)" 3 0
+for e in 1 2 3; do addnoise -q -s 1$e "four.fits[SCI,$e]" -o k$e.fits; done
+drizzle k1.fits k2.fits k3.fits -o k.fits
+near "NOISSEED: the sum of three" "$($F card k.fits 1 NOISSEED)" 36 0
 # lists of operands
 printf '# exposures\n e2.fits\ne1.fits \n\n' >two.lst; printf 'e4.fits\n' >rest.lst
 drizzle @two.lst e3.fits @rest.lst -x 0.07 --pixfrac 0.9 -o o2.fits
@@ -223,14 +228,23 @@ truth=$SHARED/truth/drizzle
 if [ -d "$truth" ] && python3=$(command -v /usr/bin/python3) && $python3 -c 'import astropy' 2>/dev/null; then
     compare() { ok "$1" $python3 "$SHARED/tools/compare_drizzle.py" out.fits "$truth/$2.fits.gz" --wht 'out.fits[WHT]' "$truth/$2.fits.gz[WHT]" "${@:3}"; }
     maps() { for i in 0 1 2 3; do printf -- '--weight\n%s\n' "$truth/$1_in$i.fits.gz[WHT]"; done; }
+    # sum of SCI times WHT over the reference's
+    flux() { near "$1: weighted flux over the reference's" "$($python3 -c "
+import sys, numpy as np
+from astropy.io import fits
+def total(f):
+    with fits.open(f) as h: return np.nansum(next(x.data for x in h if x.data is not None).astype(float) * h['WHT'].data.astype(float))
+print('%.9f' % (total('out.fits') / total(sys.argv[1])))" "$truth/$1.fits.gz")" 1 1e-6; }
     for k in square:0.5 point:0.5 square:1.0; do
         n=shift_${k%:*}_pf${k#*:}_exact; mapfile -t M < <(maps shift)
         drizzle "$truth"/shift_in[0-3].fits.gz "${M[@]}" --like "$truth/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
         compare "$n, 2e-6 rms" $n --rtol 1e-7
+        flux $n
     done
     mapfile -t M < <(maps rot)
     drizzle "$truth"/rot_in[0-3].fits.gz "${M[@]}" --like "$truth/rot_square_pf0.8_exact.fits.gz" --pixfrac 0.8 --units mean -o out.fits
-    compare "rot_square_pf0.8_exact, 2e-5 rms" rot_square_pf0.8_exact --rtol 2e-5 --atol 2e-5 --watol 2e-5
+    compare "rot_square_pf0.8_exact, 2e-5 rms" rot_square_pf0.8_exact --rtol 0 --atol 2e-5 --watol 2e-5
+    flux rot_square_pf0.8_exact
     for k in turbo:0.5 gaussian:1.0; do
         n=shift_${k%:*}_pf${k#*:}; mapfile -t M < <(maps shift)
         drizzle "$truth"/shift_in[0-3].fits.gz "${M[@]}" --like "$truth/$n.fits.gz" --kernel ${k%:*} --pixfrac ${k#*:} --units mean -o out.fits
@@ -376,3 +390,18 @@ for k in "--pixfrac 0" "--pixfrac 1e-9" "--kernel turbo --pixfrac 0" "--kernel p
     [ "$k" = "--pixfrac 0" ] && cp k.txt points.txt
     same "$k: points" k.txt points.txt
 done
+
+# ---- NOISECOR in detect: errors of sums over the sky grow by it, positions do not move
+blob='100 * exp(-(($x - 50) ** 2 + ($y - 48) ** 2) / 18) + (($x * 7919 + $y * 104729) % 1009) / 250'
+$F make plain.fits 100 100 "$blob"; $F make corr.fits 100 100 "$blob" "NOISECOR=                  2.4"
+for f in plain corr; do detect -q --gain 0 $f.fits --columns +FLUXERR_ISO,ERRX2_IMAGE -o $f.cat; done
+for c in FLUXERR_AUTO FLUXERR_ISO; do near "NOISECOR 2.4: $c" "$(paste <(col corr.cat $c) <(col plain.cat $c) | awk 'NR == 1 { print $1 / $2 }')" 2.4 1e-5; done
+near "NOISECOR 2.4: FLUX_AUTO stays" "$(col corr.cat FLUX_AUTO | head -1)" "$(col plain.cat FLUX_AUTO | head -1)" 0
+# the spread of fluxes of equal stars in a stack of correlated noise, over FLUXERR_AUTO
+awk 'BEGIN { print "# DX DY MAG TYPE"; for (j = 0; j < 20; j++) for (i = 0; i < 20; i++) printf "%.3f %.3f 23 star\n", (i - 9.5) * 3 + (i * 7 + j * 3) % 10 * 0.02, (j - 9.5) * 3 + (i * 3 + j * 7) % 10 * 0.02 }' >stars.txt
+psfgen --pupil-grid 64 --size 64 -o psf.fits
+simage -q stars.txt -p psf.fits -x 0.2 --subpixel 2 --size 641,641 --accuracy 1e-5 -o stars.fits
+dither -n 2 stars.fits | addnoise --depth 26.5 | drizzle -x 0.1 --pixfrac 1 --flat -o stack.fits
+detect -q --threshold 5 stack.fits -o stack.cat
+near "stack of pixfrac 1: NOISECOR" "$($F card stack.fits 0 NOISECOR)" 2.4 1e-9
+between "stack of pixfrac 1: spread of the fluxes of 400 stars over their FLUXERR_AUTO" "$(paste -d' ' <(col stack.cat FLUX_AUTO) <(col stack.cat FLUXERR_AUTO) | sort -g | awk '{ f[NR] = $1; e += $2 } END { lo = int(NR * 0.16) + 1; hi = int(NR * 0.84); printf "%.3f", (f[hi] - f[lo]) / 2 / (e / NR) }')" 0.85 1.3

@@ -196,3 +196,16 @@ grep -q 'pupil: 256 cells' cmd.err && pass "--check tells the plan" || fail "--c
 fails "full device" 1 psfgen -o /dev/full
 # a core of 0.02" at the smallest diffusion: continuous
 near "diffusion tends to none" "$(fwhm --diffusion 1e-7)" "$(fwhm --diffusion 0)" 1e-7
+
+# a band: two Gauss-Legendre wavelengths with photon weights d(lambda)/lambda are the sum of two monochromatic images
+B="--struts 0 --diffusion 0 --scale 0.02 --size 129"
+psfgen $B --bandwidth 164 --wavelengths 2 -o two.fits
+a=$(awk 'BEGIN { printf "%.12g", 820 - 82 / sqrt(3) }') b=$(awk 'BEGIN { printf "%.12g", 820 + 82 / sqrt(3) }')
+psfgen $B --wavelength "$a" -o blue.fits; psfgen $B --wavelength "$b" -o red.fits
+for f in two blue red; do $F dump $f.fits 0 >$f.txt; done
+near "two wavelengths = their weighted images, of the peak" "$(paste two.txt blue.txt red.txt | awk -v a="$a" -v b="$b" '{ w = b / (a + b); d = $3 - w * $6 - (1 - w) * $9; if (d < 0) d = -d; if (d > m) m = d; if ($3 > p) p = $3 } END { print m / p }')" 0 2e-7
+# +-20 % about the same mean wavelength of the photons (328 / ln 1.492 = 820 nm)
+near "ePSF over a band of +-20 %: FWHM" "$(fwhm --pixel 0.1 --wavelength 831.3 --bandwidth 328)" "$(fwhm --pixel 0.1)" 0.0001
+# an obscuration off the axis keeps the area
+psfgen --struts 0 --diffusion 0 --size 65 --obscuration 0.3 --obscuration-offset 0.1,0.05 -v -o off.fits 2>off.txt
+near "an obscuration off the axis: area" "$(card off.fits TELAREA)" "$(awk 'BEGIN { print atan2(0, -1) * (1 - 0.09) }')" 1e-3

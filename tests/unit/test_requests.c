@@ -168,7 +168,10 @@ static size_t parts_of(const struct plan *p, size_t i)
     return p->emitter[i].parts > 1 ? (size_t)p->emitter[i].parts : 1;
 }
 
-/* Side of the reference of the object whose first part is i: four times its largest stamp's, as far as memory goes. */
+/*
+ * Side of the reference of the object whose first part is i: four times its largest stamp's, as far as memory goes
+ * (without a PSF the middle is enough: nothing comes back from outside).
+ */
 static int reference_side(const struct plan *p, size_t i)
 {
     int side = 0;
@@ -178,7 +181,7 @@ static int reference_side(const struct plan *p, size_t i)
         side = d->path != PATH_NONE && larger > side ? larger : side;
     }
     const int room = p->view.psf ? (int)fmin(ROOM, 4000 / (p->view.psf->ucut * p->view.pixel)) / 2 * 2 : ROOM;
-    return 4 * side < room ? 4 * side : side > room ? side : room;
+    return 4 * side < room ? 4 * side : side > room && p->view.psf ? side : room;
 }
 
 /* Worst pixel error of the object whose first part is i over what was requested; NaN when something fails. */
@@ -207,8 +210,11 @@ static double error_of(const struct plan *p, size_t i, struct ruler *r)
         if (scene_stamp(p, k, r->work, r->scratch, r->part))
             return NAN;
         for (int b = 0; b < d->ny; b++)
-            for (int a = 0; a < d->nx; a++)
-                r->sum[(size_t)(b + d->y0 - y0) * (size_t)wide + (size_t)(a + d->x0 - x0)] -= r->part[b * d->nx + a];
+            for (int a = 0; a < d->nx; a++) {
+                const int row = b + d->y0 - y0, column = a + d->x0 - x0;
+                if (row >= 0 && row < wide && column >= 0 && column < wide)
+                    r->sum[(size_t)row * (size_t)wide + (size_t)column] -= r->part[(size_t)b * (size_t)d->nx + (size_t)a];
+            }
     }
     for (size_t j = 0; j < area; j++)
         worst = r->sum[j] == r->sum[j] ? fmax(worst, fabs(r->sum[j])) : NAN;
@@ -279,7 +285,11 @@ static void requested(const struct request *q, const struct otf *t, const struct
         exit(1);
     r.scratch = malloc((3 * plan_scratch(&p) + 1) * sizeof *r.scratch);
     r.sum = fft_alloc((size_t)ROOM * ROOM * sizeof *r.sum);
-    r.part = fft_alloc((size_t)ROOM * ROOM * sizeof *r.part);
+    size_t room = (size_t)ROOM * ROOM;             /* a stamp may be larger than its reference */
+    for (size_t i = 0; i < p.n; i++)
+        if (p.draw[i].path != PATH_NONE && (size_t)p.draw[i].nx * (size_t)p.draw[i].ny > room)
+            room = (size_t)p.draw[i].nx * (size_t)p.draw[i].ny;
+    r.part = fft_alloc(room * sizeof *r.part);
     size_t (*order)[3] = malloc(s.n * sizeof *order), n = 0;
     for (size_t i = 0, k = 0; k < s.n; k++) {
         order[n][0] = (size_t)reference_side(&p, i);
