@@ -133,6 +133,21 @@ static int zero_row(const struct wcsprm *w)
     return 0;
 }
 
+/* A celestial axis whose unit is no angle; wcslib 7.12 refuses it too, and loses memory. */
+static const char *not_an_angle(const struct wcsprm *w)
+{
+    static const char *const angle[] = {"", "deg", "arcmin", "arcsec", "mas", "rad"};
+    for (int i = 0; i < w->naxis; i++) {
+        size_t k = 0;
+        const size_t n = sizeof angle / sizeof *angle;
+        while (k < n && strcmp(w->cunit[i], angle[k]) != 0)
+            k++;
+        if (k == n && w->ctype[i][4] == '-')
+            return w->cunit[i];
+    }
+    return NULL;
+}
+
 /* Set up the primary WCS that wcspih found and reduce it to its two celestial axes. */
 static int reduce(struct sky *s, struct err *e)
 {
@@ -143,6 +158,8 @@ static int reduce(struct sky *s, struct err *e)
     if (zero_row(w))
         return err_set(e, E_DATA, "WCS: the CD matrix is singular");
     (void)unitfix(0, w);                      /* old spellings of degree; the rest wcsset refuses */
+    if (not_an_angle(w))
+        return err_set(e, E_DATA, "WCS: the unit of an axis, '%.16s', is no angle", not_an_angle(w));
     int st = wcsset(w);
     if (st)
         return wcs_failed(e, w, "WCS", st);

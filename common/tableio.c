@@ -493,6 +493,9 @@ static int parse_ragged(struct rows *r, struct column *c, size_t row, const char
 
 static int parse_word(struct rows *r, struct column *c, size_t row, const char *p, size_t n)
 {
+    for (size_t i = 0; i < n; i++)
+        if ((unsigned char)p[i] < 32 || p[i] == 127 || p[0] == '#')
+            return cell_error(r->s, c->name, p, n, "is not one plain word");
     char *w = strndup(p, n);
     if (!w)
         return no_memory(r->s);
@@ -949,7 +952,10 @@ static void put_header(struct sink *k, const struct table *t, const char *record
 /* A word must come back as one cell. */
 static int word_fits(const char *w)
 {
-    return w[0] && !strpbrk(w, " \t\r\n\v\f") && w[0] != '#';
+    for (const char *p = w; *p; p++)
+        if ((unsigned char)*p <= 32 || *p == 127)
+            return 0;
+    return w[0] && w[0] != '#';
 }
 
 static int put_row(struct sink *k, const struct table *t, size_t row, const char *name, struct err *e)

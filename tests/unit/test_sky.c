@@ -201,6 +201,11 @@ static void test_failures(void)
     check_that(sky_open(&s, &h, &e) == E_DATA && !s, "a singular matrix: %s", e.text);
     header_free(&h);
     h = tan_header(0.1, 10, 20, 150, 2.2);
+    if (header_set_str(&h, "CUNIT1", "dqg", NULL))
+        abort();
+    check_that(sky_open(&s, &h, &e) == E_DATA && strstr(e.text, "'dqg', is no angle"), "an unknown unit: %s", e.text);
+    header_free(&h);
+    h = tan_header(0.1, 10, 20, 150, 2.2);
     if (header_set_str(&h, "CTYPE1", "RA---XYZ", NULL))
         abort();
     check_that(sky_open(&s, &h, &e) == E_DATA || sky_open(&s, &h, &e) == E_MISSING, "an unknown projection: %s", e.text);

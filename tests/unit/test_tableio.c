@@ -38,6 +38,8 @@ static void refuse(const char *text, const char *want)
 static void test_refused(void)
 {
     refuse("", "in.txt: the file is empty");
+    refuse("# ID NAME\n1 a\x0c""b\n", "in.txt: line 2: column NAME: 'a\x0c""b' is not one plain word");
+    refuse("# ID NAME\n1 a\n2 #b\n", "in.txt: line 3: column NAME: '#b' is not one plain word");
     refuse("1 2\n", "in.txt: no column names: the header needs a line '# NAME NAME ...' in capital letters");
     refuse("# this has no names\n1 2\n", "in.txt: no column names: the header needs a line '# NAME NAME ...' in capital letters");
     refuse("# X FLUX\n1 2\n1 1.5abc\n", "in.txt: line 3: column FLUX: '1.5abc' is not a number");
