@@ -116,7 +116,7 @@ paper: $(filter deps,$(MAKECMDGOALS))    # the whole experiment of High et al. (
 	$(MAKE) $(JOBS) all
 	$(MAKE) -C examples/pixelscale paper $(if $(GALAXIES),GALAXIES=$(abspath $(GALAXIES)))
 
-calibration: all    # how good the shears are: slopes and biases with errors on 24 fields; half an hour
+calibration: all    # how good the shears are: slopes and biases with errors on 24 fields; a quarter of an hour
 	$(MAKE) -C examples/calibration
 
 dithers: all    # what imperfect dithers cost: noise, galaxies, slopes against drop size; four minutes
