@@ -610,6 +610,8 @@ static struct piece piece_of(const struct mesh *m, long k, long y, double h, lon
 /* The node interval of pixel x: -1 .. mx - 1. */
 static long interval_of(const struct mesh *m, double h, long x)
 {
+    if (m->mx == 1)
+        return 0;
     long k = (long)floor(((double)x + 0.5) * h - 0.5 + 1e-9);
     k = k < -1 ? -1 : k > m->mx - 1 ? m->mx - 1 : k;
     while (k >= 0 && m->first[k] > x)

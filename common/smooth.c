@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+enum { MOST = 1280 };          /* radius at 1000 pixels of FWHM: 1274 */
+
 int smooth_new(struct smooth *s, double fwhm_px)
 {
     if (!(fwhm_px >= 0 && fwhm_px <= 1000))
@@ -38,36 +40,8 @@ static inline const lanes *at(const float *p)
     return (const lanes *)(const void *)p;
 }
 
-/* out[i] = k[0] mid[i] + sum_j k[j] (mid[i - j] + mid[i + j]) */
-WIDE static void along(const float *mid, const float *k, int r, long n, float *out)
-{
-    long x = 0;
-    for (; x + STEP <= n; x += STEP) {
-        const lanes *m = at(mid + x);
-        lanes a = k[0] * m[0], b = k[0] * m[1], c = k[0] * m[2], d = k[0] * m[3];
-        for (int j = 1; j <= r; j++) {
-            const lanes *p = at(mid + x - j), *q = at(mid + x + j);
-            a += k[j] * (p[0] + q[0]);
-            b += k[j] * (p[1] + q[1]);
-            c += k[j] * (p[2] + q[2]);
-            d += k[j] * (p[3] + q[3]);
-        }
-        lanes *o = (lanes *)(void *)(out + x);
-        o[0] = a;
-        o[1] = b;
-        o[2] = c;
-        o[3] = d;
-    }
-    for (; x < n; x++) {
-        float a = k[0] * mid[x];
-        for (int j = 1; j <= r; j++)
-            a += k[j] * (mid[x - j] + mid[x + j]);
-        out[x] = a;
-    }
-}
-
 /* out[i] = k[0] row[r][i] + sum_j k[j] (row[r - j][i] + row[r + j][i]) */
-WIDE static void across(const float *const *row, const float *k, int r, long n, float *out)
+WIDE static void weigh(const float *const *row, const float *k, int r, long n, float *out)
 {
     long x = 0;
     for (; x + STEP <= n; x += STEP) {
@@ -96,12 +70,15 @@ WIDE static void across(const float *const *row, const float *k, int r, long n, 
 
 void smooth_row(const struct smooth *s, const float *in, long n, float *out)
 {
-    along(in, s->k, s->radius, n, out);
+    const float *shifted[2 * MOST + 1];    /* along a row: the row beside itself */
+    for (int j = 0; j <= 2 * s->radius; j++)
+        shifted[j] = in + j - s->radius;
+    weigh(shifted, s->k, s->radius, n, out);
 }
 
 void smooth_column(const struct smooth *s, const float *const *row, long n, float *out)
 {
-    across(row, s->k, s->radius, n, out);
+    weigh(row, s->k, s->radius, n, out);
 }
 
 double smooth_noise(const struct smooth *s)
