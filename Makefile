@@ -122,6 +122,9 @@ calibration: all    # how good the shears are: slopes and biases with errors on 
 dithers: all    # what imperfect dithers cost: noise, galaxies, slopes against drop size; four minutes
 	$(MAKE) -C examples/dithers
 
+threshold: all    # objects against pixel scale by two thresholds; ten seconds
+	$(MAKE) -C examples/threshold
+
 deps:    # install the compiler, the libraries and the plotter (Debian, Ubuntu)
 	@tests/deps
 
@@ -147,9 +150,10 @@ clean:    # remove everything that was built
 	$(MAKE) -s -C examples/pixelscale clean
 	$(MAKE) -s -C examples/calibration clean
 	$(MAKE) -s -C examples/dithers clean
+	$(MAKE) -s -C examples/threshold clean
 	$(MAKE) -s -C examples/accuracy clean
 
 help:    # this list
 	@sed -n 's/^\([a-z-]*\):[^=#]*# */\1\t/p' Makefile | awk -F'\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
-.PHONY: all layers check check-large sanitize tsan fuzz coverage lint bench accuracy quick paper calibration dithers deps deps-slurm install uninstall clean help FORCE
+.PHONY: all layers check check-large sanitize tsan fuzz coverage lint bench accuracy quick paper calibration dithers threshold deps deps-slurm install uninstall clean help FORCE
