@@ -38,3 +38,9 @@ ok "KEEP=1 keeps image and segmentation" test -s tiny/work/sim1-0.10-1a.fits -a 
 rm tiny/sim1-0.10-1a.plain.use.fits
 make -s tiny FIGURES= PICTURES= SNR=nonsense >log 2>&1 && fail "a failing step must fail the run" || pass "a failing step fails the run"
 ok "and names itself" grep -q '^cutcat: ' log
+ok "and leaves nothing half-made" test ! -e tiny/sim1-0.10-1a.plain.use.fits -a -z "$(find tiny -name '.*.tmp')"
+
+# other galaxies and depths are other folders' business: the same sky for all scales, own galaxies when asked for
+ok "all scales show one sky" test -s tiny/sky.scene -a ! -e tiny/sim1-0.10.scene
+make -s tiny FIGURES= PICTURES= SKY=own OUT=tiny-own tiny.fields=sim1-0.10 tiny.shears=0 >log 2>&1 || fail "SKY=own: $(tail -1 log)"
+ok "SKY=own: each scale its own" test -s tiny-own/sim1-0.10.scene -a ! -e tiny-own/sky.scene
