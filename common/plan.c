@@ -16,6 +16,7 @@
 
 #define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
 #define PART_PIXELS 1048576    /* larger stamps are made in parts */
+#define PIXEL_COST 5e-9        /* seconds to sum, convert and write a pixel of the image */
 #define MAPPED_LONGEST 10.0    /* seconds for one object without a PSF; those that need more are not drawn */
 
 /* Sides of stamps: multiples of 8 or nearly, with factors 2, 3 and 5. */
@@ -343,7 +344,12 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     const struct stamp_grid *g = &p->grid[d->grid];
     double k = fmin(d->kcut, g->kmax), plane = 0.8 * k * k;
     double rows = d->mapped ? plane * (20e-9 + 2e-9 * orders) : plane * (0.25e-9 * orders + 1.5e-9);
-    return 1.5e-6 + matrix + rows + 1e-9 * orders * orders * k / 8 + area * (0.8e-9 + 0.25e-9 * log2(d->nx));
+    if (g->columns)
+        rows += 6e-9 * plane;              /* rows of T, made for this stamp */
+    double pixel = 0.8e-9 + 0.25e-9 * log2(d->nx);
+    if (area > 6e5)                        /* beyond the caches */
+        pixel *= 1.8;
+    return 1.5e-6 + matrix + rows * g->parts + 1e-9 * orders * orders * k / 8 + area * pixel;
 }
 
 /* Tolerance of an object of several parts: from the sum of their peaks, divided as the square root of flux. */
@@ -533,6 +539,7 @@ static int make(struct maker *m)
         p->count[p->draw[i].path]++;
         p->cost += cost_of(p, &p->emitter[i], &p->draw[i]);
     }
+    p->cost += PIXEL_COST * (double)p->view.nx * (double)p->view.ny;
     return st;
 }
 

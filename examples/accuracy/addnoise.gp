@@ -1,7 +1,9 @@
 # addnoise: chi-square of a million pixels, in standard deviations, and time per pixel.
 load "../pixelscale/style.gp"
+set xtics autofreq
 f = dir."/addnoise.txt"
 set logscale x
+set format x "10^{%T}"
 set xlabel "mean / electron"
 do for [t in "svg pdf png"] {
     eval(t eq "svg" ? svg("addnoise") : t eq "pdf" ? pdf("addnoise") : png("addnoise"))

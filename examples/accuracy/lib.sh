@@ -12,3 +12,9 @@ cpu() {
         { TIMEFORMAT='%U %S'; time "$@" >/dev/null 2>cpu.err; } 2>&1 | awk '{ print $1 + $2 }'
     done | sort -g | sed -n 1p
 }
+# pick FILE NAME...: columns of a text catalogue, a line a row
+pick() {
+    awk -v want="${*:2}" 'BEGIN { n = split(want, w, " ") }
+        /^#/ { line = $0; next } !c[1] { k = split(line, h, " "); for (i = 2; i <= k; i++) for (j = 1; j <= n; j++) if (h[i] == w[j]) c[j] = i - 1 }
+        { for (j = 1; j <= n; j++) printf "%s%s", $(c[j]), j < n ? " " : "\n" }' "$1"
+}

@@ -1,11 +1,13 @@
 # psfgen: error over the peak against processor time, by pupil grid and by wavelengths.
 load "../pixelscale/style.gp"
+set xtics autofreq
 f = dir."/psfgen.txt"
 rows(p) = "< awk '$2 == \"".p."\"' ".f
 set logscale xy
 set format y "10^{%T}"
 set key bottom left
 set xtics (1, 2, 4, 8, 16, 64, 256, 1024)
+set xrange [*:*] noextend
 do for [t in "svg pdf png"] {
     eval(t eq "svg" ? svg("psfgen") : t eq "pdf" ? pdf("psfgen") : png("psfgen"))
     set multiplot layout 1,2
