@@ -6,6 +6,9 @@ if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then skip "a sanitizer's build cann
 [ -f "$so" ] || { fail "no $so"; exit 1; }
 
 small_chain
+printf '# DX DY\n0 0\n0.3 -1.2\n' >offsets.txt
+printf '# EXPNUM DX DY\n1 0 0\n2 .5 0\n3 .5 .5\n4 0 .5\n' >shifts.txt
+echo dith.fits >list.txt
 ls >inputs
 
 clean_run() { # LABEL: judge the run in $st with output out, reference ref
@@ -48,8 +51,10 @@ sweep galgen galgen --field 12 -n 30 --stars
 sweep simage simage scene.txt --models models.txt -p psf.fits -x 0.1 --size 60,60
 sweep simage simage scene.txt --models models.txt -x 0.1 --wcs true.fits
 sweep dither dither -n 2 half.fits
+sweep "dither between small pixels" dither -q -n 2 --offsets offsets.txt half.fits
 sweep addnoise addnoise --depth 27.7 true.fits
 sweep drizzle drizzle dith.fits -x 0.1 --pixfrac 0.5
+sweep "drizzle by lists" drizzle @list.txt --shift shifts.txt --var @list.txt --mask @list.txt -x 0.07
 sweep detect detect noisy.fits
 sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
 sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
