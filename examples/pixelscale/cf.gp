@@ -2,7 +2,7 @@
 # the line leaves: as public code treats the fourth moments (the paper's 0.8),
 # and with exact ones.  Full symbols g_1, open ones g_2.
 load "style.gp"
-set xrange [0.03:0.25]
+set xrange [0.03:0.30]
 set xtics 0.08
 
 set format y "%.2f"

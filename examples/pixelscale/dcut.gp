@@ -11,7 +11,7 @@ set y2range [0:*]
 set key bottom right
 do for [t in "svg pdf png"] {
     eval(out(t, "dcut"))
-    plot [0.02:0.26] 1 with lines lc rgb "#888888" dt 3 title "one pixel", \
+    plot [0.02:0.30] 1 with lines lc rgb "#888888" dt 3 title "one pixel", \
         own("dcut", which, "DCUT") using 1:2 with linespoints ls 1 title "pixels", \
         own("dcut", which, "DCUT_NOFLOOR") using 1:2 with lines ls 2 title "pixels, without 0.4", \
         own("dcut", which, "DCUT_ARCSEC") using 1:2 axes x1y2 with linespoints ls 3 title "arcsec (right)"

@@ -11,11 +11,11 @@ do for [t in "svg pdf png"] {
     set multiplot layout 1,2
     eval(above)
     set label 1 "C_l = 0" at graph 0.05, 0.06
-    plot [0.02:0.26] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) own("errors-exact", s, "LOGDC LOGDCERR") using 1:2:3 with yerrorlines ls i title name(s)
+    plot [0.02:0.30] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) own("errors-exact", s, "LOGDC LOGDCERR") using 1:2:3 with yerrorlines ls i title name(s)
     set label 1 "C_l = shot noise at 0.10\""
     set ylabel ""
     unset key
-    plot [0.02:0.26] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) own("errors-exact", s, "LOGDC1") using 1:2 with linespoints ls i notitle
+    plot [0.02:0.30] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) own("errors-exact", s, "LOGDC1") using 1:2 with linespoints ls i notitle
     unset multiplot
 }
 set output

@@ -8,10 +8,10 @@ do for [t in "svg pdf png"] {
     set multiplot layout 1,2
     set ylabel "kurtosis - 3 of γ_1"
     eval(above)
-    plot [0.02:0.26] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) fom("exact", s, "KURT1 KURT1ERR") using 1:2:3 with yerrorbars ls i title name(s)
+    plot [0.02:0.30] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) fom("exact", s, "KURT1 KURT1ERR") using 1:2:3 with yerrorbars ls i title name(s)
     set ylabel "skewness of γ_1"
     unset key
-    plot [0.02:0.26] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) fom("exact", s, "SKEW1 SKEW1ERR") using 1:2:3 with yerrorbars ls i notitle
+    plot [0.02:0.30] 0 with lines lc rgb "#888888" dt 3 notitle, for [i=1:4] s=word(sets, i) fom("exact", s, "SKEW1 SKEW1ERR") using 1:2:3 with yerrorbars ls i notitle
     unset multiplot
 }
 set output

@@ -5,7 +5,7 @@ set xlabel theta_s
 set ylabel "galaxies / arcmin^{-2}"
 set yrange [0:430]
 set xtics 0.08
-set xrange [0.02:0.26]
+set xrange [0.02:0.30]
 set key font ",10" samplen 1.5
 cuts = "N_DET N_ELLCUT N_SIZECUT"
 left(c) = c eq "N_DET" ? "detected" : c eq "N_ELLCUT" ? "|e| < 1" : "large enough"

@@ -13,6 +13,6 @@ ch = system(sprintf("cat %s/sim1*-stars.rrg | sed -n 's/^# Keyword: CHDIFF = //p
 do for [t in "svg pdf png"] {
     eval(out(t, "simsets"))
     do for [i=1:4] { set label i what(word(sets, i)) at graph 0.02, first 5.28-i font ",10" }
-    plot [0.02:0.26] for [i=1:4] s=word(sets, i) scales(s) using 1:(5-i) with points ls i ps 1.2
+    plot [0.02:0.30] for [i=1:4] s=word(sets, i) scales(s) using 1:(5-i) with points ls i ps 1.2
 }
 set output
