@@ -3,7 +3,7 @@ echo '# DX DY MAG TYPE
 0 0 20 star
 31 -22 19 star' >scene
 image() { simage scene -x 0.05 --size 2000,1500; }
-ok "a file" image -o file.fits
+ok "a file" simage scene -x 0.05 --size 2000,1500 -o file.fits
 image | cat >pipe.fits
 same "through a pipe" file.fits pipe.fits
 image >redirected.fits
