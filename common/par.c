@@ -49,6 +49,48 @@ static void *work(void *arg)
     return NULL;
 }
 
+/* ---- threads that stay ---- */
+
+struct member {
+    struct par_team *team;
+    int id;
+    pthread_t thread;
+};
+
+struct par_team {
+    int made;                 /* threads besides the caller's */
+    struct member member[255];
+    pthread_mutex_t lock;
+    pthread_cond_t start, done;
+    struct pool *pool;        /* what to work on */
+    unsigned long turn;       /* counts loops */
+    int busy, stop;
+};
+
+static void *serve(void *arg)
+{
+    struct member *me = arg;
+    struct par_team *t = me->team;
+    struct worker self = {NULL, me->id};
+    unsigned long seen = 0;
+    pthread_mutex_lock(&t->lock);
+    for (;;) {
+        while (t->turn == seen && !t->stop)
+            pthread_cond_wait(&t->start, &t->lock);
+        if (t->stop)
+            break;
+        seen = t->turn;
+        self.pool = t->pool;
+        pthread_mutex_unlock(&t->lock);
+        work(&self);
+        pthread_mutex_lock(&t->lock);
+        if (--t->busy == 0)
+            pthread_cond_signal(&t->done);
+    }
+    pthread_mutex_unlock(&t->lock);
+    return NULL;
+}
+
 int par_for(long n, long chunk, int threads, par_body *body, void *ctx)
 {
     if (n < 0 || chunk < 1 || threads < 1 || threads > 256)
@@ -74,4 +116,66 @@ int par_for(long n, long chunk, int threads, par_body *body, void *ctx)
         pthread_join(id[t], NULL);
     pthread_mutex_destroy(&p.lock);
     return p.status;
+}
+
+struct par_team *par_team_new(int threads)
+{
+    struct par_team *t = threads > 1 && threads <= 256 ? calloc(1, sizeof *t) : NULL;
+    if (!t)
+        return NULL;
+    if (pthread_mutex_init(&t->lock, NULL) || pthread_cond_init(&t->start, NULL) || pthread_cond_init(&t->done, NULL)) {
+        free(t);
+        return NULL;
+    }
+    for (int k = 0; k < threads - 1; k++) {
+        t->member[k] = (struct member){.team = t, .id = k + 1};
+        if (pthread_create(&t->member[k].thread, NULL, serve, &t->member[k]))
+            break;
+        t->made++;
+    }
+    return t;
+}
+
+int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void *ctx)
+{
+    if (n < 0 || chunk < 1)
+        return E_RANGE;
+    struct pool p = {.n = n, .chunk = chunk, .body = body, .ctx = ctx};
+    struct worker self = {&p, 0};
+    if (pthread_mutex_init(&p.lock, NULL))
+        return E_NOMEM;
+    const int others = team && n > chunk ? team->made : 0;
+    if (others) {
+        pthread_mutex_lock(&team->lock);
+        team->pool = &p;
+        team->busy = others;
+        team->turn++;
+        pthread_cond_broadcast(&team->start);
+        pthread_mutex_unlock(&team->lock);
+    }
+    work(&self);
+    if (others) {
+        pthread_mutex_lock(&team->lock);
+        while (team->busy)
+            pthread_cond_wait(&team->done, &team->lock);
+        pthread_mutex_unlock(&team->lock);
+    }
+    pthread_mutex_destroy(&p.lock);
+    return p.status;
+}
+
+void par_team_free(struct par_team *team)
+{
+    if (!team)
+        return;
+    pthread_mutex_lock(&team->lock);
+    team->stop = 1;
+    pthread_cond_broadcast(&team->start);
+    pthread_mutex_unlock(&team->lock);
+    for (int k = 0; k < team->made; k++)
+        pthread_join(team->member[k].thread, NULL);
+    pthread_cond_destroy(&team->start);
+    pthread_cond_destroy(&team->done);
+    pthread_mutex_destroy(&team->lock);
+    free(team);
 }

@@ -12,6 +12,7 @@
 #define WINDOW_PIXELS 1048576  /* doubles of the window, at most */
 #define PART_PIXELS 1048576    /* pixels, about, of one part of a stamp without a PSF */
 #define SHARES 48              /* pieces into which a batch is cut for the threads */
+#define PAGE_FLOATS 1024       /* in the smallest page of memory */
 #define STRIPS 8               /* columns of the image added by one thread */
 #define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
 
@@ -249,8 +250,19 @@ static void batch_fill(const struct plan *p, const struct entry *e, size_t n, st
     }
 }
 
+/* Rows of the image come into memory, each by one thread: two that meet in a fresh page wait for the kernel, five times as long. */
+static int touch_rows(void *ctx, long begin, long end, int worker)
+{
+    (void)worker;
+    const struct image *im = ctx;
+    float *from = im->pix + (size_t)begin * (size_t)im->nx, *end_row = im->pix + (size_t)end * (size_t)im->nx;
+    for (; from < end_row; from += PAGE_FLOATS)            /* a write at once, that changes nothing: a read first would cost a second fault */
+        __atomic_fetch_or((unsigned int *)(void *)from, 0, __ATOMIC_RELAXED);
+    return OK;
+}
+
 /* All batches in turn; with two of them one is added while the other is drawn, so that no thread waits. */
-static int run(struct job *j, size_t n, const struct entry *e, struct batch *b, int batches, int threads)
+static int run(struct job *j, size_t n, const struct entry *e, struct batch *b, int batches, struct par_team *team)
 {
     const struct batch none = {0};
     int turn = 0, st = OK;
@@ -261,11 +273,11 @@ static int run(struct job *j, size_t n, const struct entry *e, struct batch *b, 
         begin += next->n;
         j->draw = next;
         const long items = (long)next->n + (j->add->n ? STRIPS : 0);
-        st = par_for(items, 1 + items / SHARES, threads, add_and_draw, j);
+        st = par_team_for(team, items, 1 + items / SHARES, add_and_draw, j);
         j->add = next;
         j->draw = &none;
         if (st == OK && (batches == 1 || begin == n)) {
-            st = par_for(STRIPS, 1, threads, add_and_draw, j);
+            st = par_team_for(team, STRIPS, 1, add_and_draw, j);
             j->add = &none;
         }
     }
@@ -344,14 +356,21 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
     double *space = fft_alloc((size + 8) * sizeof *space);
     double **stamp = malloc(2 * (BATCH_PIXELS / 16) * sizeof *stamp);
     if (q->tallest)
-        w.row = calloc((size_t)w.height * (size_t)im->nx, sizeof *w.row);
+        w.row = malloc((size_t)w.height * (size_t)im->nx * sizeof *w.row);
+    if (w.row)
+        memset(w.row, 0, (size_t)w.height * (size_t)im->nx * sizeof *w.row);    /* here, not by threads that meet in its pages */
     int st = workers && stamp && space && (w.row || !q->tallest) ? workers_new(workers, threads, plan_scratch(p)) : E_NOMEM;
     if (st == OK) {
         const size_t half = size / (size_t)batches / 8 * 8;
         struct batch b[2] = {{.stamp = stamp, .space = space, .size = half},
                              {.stamp = stamp + BATCH_PIXELS / 16, .space = space + half, .size = half}};
         struct job job = {.p = p, .w = &w, .worker = workers, .bar = bar};
-        st = run(&job, q->n, e, b, batches, threads);
+        struct par_team *team = par_team_new(threads);
+        if (team)
+            st = par_team_for(team, im->ny, 1 + im->ny / 16, touch_rows, im);
+        if (st == OK)
+            st = run(&job, q->n, e, b, batches, team);
+        par_team_free(team);
     }
     for (int t = 0; workers && t < threads; t++) {
         stamp_work_free(workers[t].work);
