@@ -1,5 +1,6 @@
 /* image.c - pixels in memory. */
 #include "image.h"
+#include "pages.h"
 #include <stdlib.h>
 
 int image_new(struct image *im, long nx, long ny)
@@ -9,6 +10,7 @@ int image_new(struct image *im, long nx, long ny)
     float *pix = calloc((size_t)nx * (size_t)ny, sizeof *pix);
     if (!pix)
         return E_NOMEM;
+    pages_large(pix, (size_t)nx * (size_t)ny * sizeof *pix);
     *im = (struct image){.nx = nx, .ny = ny, .pix = pix};
     return OK;
 }
