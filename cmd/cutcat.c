@@ -28,6 +28,19 @@ static double key_or_nan(const struct table *t, const char *name)
     return table_key_number(t, name, &v) == OK ? v : NAN;
 }
 
+/* Sizes are in pixels: both files must mean the same ones (or neither say what they are). */
+static void check_scale(const char *name, const struct table *stars, const struct table *cat)
+{
+    const double ours = key_or_nan(cat, "PIXSCALE"), theirs = key_or_nan(stars, "PIXSCALE");
+    if (isnan(ours) && isnan(theirs))
+        return;
+    if (isnan(ours) || isnan(theirs))
+        die(EXIT_RUN, "%s: no keyword PIXSCALE in the %s to compare with the other file's %g", name, isnan(ours) ? "catalogue" : "star file",
+            isnan(ours) ? theirs : ours);
+    if (!(fabs(theirs / ours - 1) <= 1e-6))
+        die(EXIT_RUN, "%s: stars for pixels of %g arcsec, but the catalogue has %g", name, theirs, ours);
+}
+
 /* d* in pixels from the star-moment file, else from the catalogue's own keywords. */
 static void find_dstar(struct cuts *c, struct starmom *stars, const struct params *p, const struct table *cat,
                        double max_memory)
@@ -41,9 +54,7 @@ static void find_dstar(struct cuts *c, struct starmom *stars, const struct param
     struct table t = {0};
     if (table_read(&t, p->stars, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    double ours = key_or_nan(cat, "PIXSCALE"), theirs = key_or_nan(&t, "PIXSCALE");
-    if (fabs(theirs / ours - 1) > 1e-6)
-        die(EXIT_RUN, "%s: stars for pixels of %g arcsec, but the catalogue has %g", p->stars, theirs, ours);
+    check_scale(p->stars, &t, cat);
     if (p->which == DSTAR_EACH || c->locus_width > 0) {
         if (starmom_from_table(stars, &t, &e))
             die(EXIT_RUN, "%s: %s", p->stars, e.text);

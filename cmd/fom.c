@@ -229,7 +229,7 @@ int main(int argc, char **argv)
     check(fom_compare(groups, r, &o), "lines over scales");
     check(fom_optimum(groups, r, &o), "best scale");
     if (c.check) {
-        printf("%zu catalogues in %zu groups\n", n, groups);
+        warn("%zu catalogues in %zu groups", n, groups);
     } else if (text) {
         write_text(&c, groups, r);
     } else {

@@ -86,15 +86,15 @@ static void check_options(struct params *p, const struct opt *own, const struct 
     p->n = (long)n;
 }
 
-static void print_plan(FILE *f, const struct params *p)
+static void print_plan(const struct params *p)
 {
     if (p->stars)
-        fprintf(f, "galgen: %ld stars of magnitude %g in %.4f arcmin^2\n", p->n, p->star_mag, area(p));
+        warn("%ld stars of magnitude %g in %.4f arcmin^2", p->n, p->star_mag, area(p));
     else if (p->library)
-        fprintf(f, "galgen: %ld galaxies from %s, magnitudes %s, in %.4f arcmin^2 (%.1f per arcmin^2)\n", p->n, p->library,
+        warn("%ld galaxies from %s, magnitudes %s, in %.4f arcmin^2 (%.1f per arcmin^2)", p->n, p->library,
                 p->library_mags == MAGS_OWN ? "their own" : "from the counts", area(p), (double)p->n / area(p));
     else
-        fprintf(f, "galgen: %ld synthetic galaxies, magnitudes %g to %g, in %.4f arcmin^2 (%.1f per arcmin^2); about %.2g s\n",
+        warn("%ld synthetic galaxies, magnitudes %g to %g, in %.4f arcmin^2 (%.1f per arcmin^2); about %.2g s",
                 p->n, p->mag[0], p->mag[1], area(p), (double)p->n / area(p), 1e-5 * (double)p->n + 0.01);
 }
 
@@ -431,7 +431,7 @@ int main(int argc, char **argv)
     if (p.library && (table_read(&models, p.library, c.max_memory, &e) || models_open(&library, &models, p.library, &e)))
         die(EXIT_RUN, "%s", e.text);
     if (c.check || c.verbose)
-        print_plan(c.check ? stdout : stderr, &p);
+        print_plan(&p);
 
     if (c.check) {
         models_free(&library);

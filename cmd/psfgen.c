@@ -98,9 +98,8 @@ static int telescope_otf(const struct psfgen *g, const struct common *c, int ask
     struct err e;
     int cells = choose_cells(g, asked, c->max_memory);
     if (c->check || c->verbose)
-        fprintf(stderr, "pupil: %d cells across %g m, %d wavelengths, %d aberrations, clear area %.4f m^2, %.0f MB\n", cells,
-                g->pupil.diameter, g->pupil.bandwidth > 0 ? g->pupil.wavelengths : 1, g->pupil.terms,
-                pupil_area(&g->pupil, 256), pupil_memory(cells) * 1e-6);
+        warn("pupil: %d cells across %g m, %d wavelengths, %d aberrations, clear area %.4f m^2, %.0f MB", cells, g->pupil.diameter,
+             g->pupil.bandwidth > 0 ? g->pupil.wavelengths : 1, g->pupil.terms, pupil_area(&g->pupil, 256), pupil_memory(cells) * 1e-6);
     if (!c->check && pupil_otf(&g->pupil, cells, t, &e))
         die(EXIT_RUN, "%s", e.text);
     return cells;
@@ -247,7 +246,7 @@ int main(int argc, char **argv)
         .examples = "  psfgen -o psf.fits\n  psfgen --telescope euclid --zernike 4:0.05,8:0.03 --pixel 0.1 --scale 0.02 -o euclid.fits\n",
     };
     const struct opt own[] = {
-        {"telescope", 'T', OPT_CHOICE, &g.telescope, 0, 0, NULL, "preset; what follows changes it", "snap|hst|euclid|roman", 0},
+        {"telescope", 0, OPT_CHOICE, &g.telescope, 0, 0, NULL, "preset; what follows changes it", "snap|hst|euclid|roman", 0},
         {"diameter", 'D', OPT_REAL, &g.pupil.diameter, 1e-3, 1000, "M", "diameter of the pupil, m", NULL, 0},
         {"wavelength", 'w', OPT_REAL, &g.wavelength_nm, 1, 1e7, "NM", "middle of the band, nm", NULL, 0},
         {"bandwidth", 'b', OPT_REAL, &g.bandwidth_nm, 0, 1e7, "NM", "full width of a band of constant F_nu, nm", NULL, 0},
@@ -257,10 +256,10 @@ int main(int argc, char **argv)
         {"struts", 0, OPT_LONG, &g.struts, 0, 360, "N", "vanes, at equal angles", NULL, 0},
         {"strut-width", 0, OPT_REAL, &g.pupil.strut_width, 0, 1000, "M", "width of a vane, m", NULL, 0},
         {"strut-angle", 0, OPT_REAL, &g.pupil.strut_angle, -360, 360, "DEG", "first vane, from x towards y, deg", NULL, 0},
-        {"zernike", 'z', OPT_STR, &g.zernike, 0, 0, "J:WAVES,...", "aberrations, Noll's order, waves rms", NULL, 0},
+        {"zernike", 0, OPT_STR, &g.zernike, 0, 0, "J:WAVES,...", "aberrations, Noll's order, waves rms", NULL, 0},
         {"pupil-grid", 'M', OPT_LONG, &g.cells, 16, PUPIL_CELLS_MAX, "N", "cells across the pupil, at least", NULL, 0},
         {"diffusion", 'd', OPT_REAL, &g.diffusion, 0, 100, "ARCSEC", "sigma of charge diffusion; 0: none", NULL, 0},
-        {"pixel", 'p', OPT_REAL, &g.pixel, 0, 100, "ARCSEC", "square pixel to put in; 0: none", NULL, 0},
+        {"pixel", 0, OPT_REAL, &g.pixel, 0, 100, "ARCSEC", "square pixel to put in; 0: none", NULL, 0},
         {"scale", 'x', OPT_REAL, &g.scale, 1e-6, 1e3, "ARCSEC", "sampling of the image", NULL, 0},
         {"size", 'n', OPT_LONG, &g.size, 1, 16384, "N", "side of the image, samples", NULL, 0},
         {"from", 'f', OPT_STR, &g.from, 0, 0, "FILE", "a PSF image or PSF file instead of a telescope", NULL, 1},

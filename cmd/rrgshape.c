@@ -342,9 +342,8 @@ static void measure_objects(struct input *in, const struct params *p, const stru
     if (shapecat_objects(&in->cat, &o, &objects, &e))
         fail(c->argv[1], &e);
     if (c->check) {
-        printf("%zu objects on %ld x %ld pixels of %g arcsec; widths %g to %g px; %s; about %.2g s\n", in->cat.nrow,
-               in->nx, in->ny, in->scale, o.min, o.max, psf ? "PSF corrected" : "no PSF correction",
-               1e-5 * (double)in->cat.nrow);
+        warn("%s: %zu objects on %ld x %ld pixels of %g arcsec; widths %g to %g px; %s; about %.2g s", c->argv[1], in->cat.nrow,
+             in->nx, in->ny, in->scale, o.min, o.max, psf ? "PSF corrected" : "no PSF correction", 1e-5 * (double)in->cat.nrow);
         free(objects);
         return;
     }
@@ -375,8 +374,8 @@ static void measure_curve(struct input *in, const struct params *p, const struct
     double own;
     if (c->check) {
         need_scale(in);
-        printf("%zu stars on %ld x %ld pixels of %g arcsec; %d widths; about %.2g s\n", in->cat.nrow, in->nx, in->ny,
-               in->scale, STARMOM_WIDTHS, 2e-3 * (double)in->cat.nrow);
+        warn("%s: %zu stars on %ld x %ld pixels of %g arcsec; %d widths; about %.2g s", c->argv[1], in->cat.nrow, in->nx, in->ny,
+             in->scale, STARMOM_WIDTHS, 2e-3 * (double)in->cat.nrow);
         return;
     }
     measure_stars(&s, in, c->argv[1], p, c->threads, &own);

@@ -48,6 +48,15 @@ near "nothing survives: a header and no row" "$(grep -vc '^#' none.cat)" 0 0
 ok "an empty catalogue" cutcat none.cat --snr 0 -o none2.cat
 { printf '# Keyword: DSTAR = 0.9\n# WIDTH\n1\n'; } >stars.rrg
 cutcat in.cat --stars stars.rrg -o s.cat; near "--stars wins over the catalogue" "$(key s.cat DSTAR)" 0.9 0
+# d* is in pixels: both files must tell the same ones, or neither
+scaled() { sed "1i # Keyword: PIXSCALE = $2" "$1"; }
+scaled in.cat 0.1 >in.1; scaled stars.rrg 0.1 >stars.1; scaled stars.rrg 0.05 >stars.05; scaled stars.rrg nan >stars.nan
+ok "stars of the same pixels" cutcat in.1 --stars stars.1 -o s1.cat
+near "their d*" "$(key s1.cat DSTAR)" 0.9 0
+fails "stars of other pixels" 1 cutcat in.1 --stars stars.05
+fails "stars that do not say of which pixels" 1 cutcat in.1 --stars stars.rrg
+fails "stars whose pixels are no number" 1 cutcat in.1 --stars stars.nan
+fails "a catalogue that does not say of which pixels" 1 cutcat in.cat --stars stars.1
 cutcat in.cat --columns MAG_AUTO,NUMBER -o cols.cat
 near "--columns: in the order of the input" "$(grep '^# NUMBER' cols.cat | tail -1 | grep -cx '# NUMBER MAG_AUTO')" 1 0
 near "--columns: the same rows" "$(col cols.cat NUMBER | tr -d '\n')" 16 0

@@ -34,3 +34,10 @@ for p in "$BIN"/*; do
     if [ -s bad.txt ]; then fail "$n: bad numbers: $(head -5 bad.txt | tr '\n' ';')"; else pass "$n: bad numbers are usage errors"; fi
     if "$n" --help >/dev/full 2>err; then fail "$n --help to a full device succeeded"; else pass "$n --help to a full device fails"; fi
 done
+
+# letters that are decided mean the same in every program that has them
+for p in "$BIN"/*; do "$p" --completion; done | awk -F'\t' '{ sub(/=$/, "", $1); print $2, $1 }' | sort -u >letters.txt
+for l in "o output" "s seed" "j threads" "q quiet" "v verbose" "h help" "V version" "p psf" "z zeropoint" "T exptime"; do
+    set -- $l
+    if [ "$(grep "^$1 " letters.txt)" = "$1 --$2" ]; then pass "-$1 is --$2 everywhere"; else fail "-$1 is $(grep "^$1 " letters.txt | tr '\n' ' ')"; fi
+done

@@ -123,7 +123,7 @@ near "NOISECOR 2.4: error of the flux 2.4 times as large" "$(paste <(col cor.out
 near "NOISECOR: error of Jxx likewise" "$(paste <(col cor.out JXXERR_RAW) <(col now.out JXXERR_RAW) | awk '{ print $1 / $2 }')" 2.4 1e-9
 near "NOISECOR: the moments stay" "$(col cor.out JXX_RAW)" "$(col now.out JXX_RAW)" 0
 fails "image and catalogue from one pipe" 2 rrgshape - - --psf none
-rrgshape --stars-only im.fits im.cat --check >plan.txt; near "--check of stars: one line" "$(wc -l <plan.txt)" 1 0
+rrgshape --stars-only im.fits im.cat --check 2>plan.txt; near "--check of stars: one line" "$(wc -l <plan.txt)" 1 0
 fails "neither stars nor PSF" 2 rrgshape im.fits im.cat
 fails "both stars and PSF" 2 rrgshape im.fits im.cat --psf none --stars x
 fails "one operand" 2 rrgshape im.fits --psf none
