@@ -263,7 +263,7 @@ int main(int argc, char **argv)
         .psf_scale = NAN, .gain = 1, .saturate = INFINITY, .qe = 1,
     };
     const struct program prog = {
-        "addnoise", "Draw what a detector reads from an image of expected electrons.", "[IMAGE]", 0, 1,
+        "addnoise", "draw what a detector reads from an image of expected electrons", "[IMAGE]", 0, 1,
         "  addnoise --depth 27.7 clean.fits -o noisy.fits\n"
         "  simage scene.txt -p psf.fits | addnoise --sky 23.3 --read-noise 4 -s 7 | detect -\n"
     };

@@ -103,7 +103,7 @@ int main(int argc, char **argv)
     struct err e;
     int kernel = DRIZZLE_SQUARE, weighting = WEIGHT_EXPTIME;
     const struct program prog = {
-        "drizzle", "Combine exposures on one grid by variable-pixel linear reconstruction.", "[EXPOSURES...]", 0, -1,
+        "drizzle", "combine exposures on one grid by variable-pixel linear reconstruction", "[EXPOSURES...]", 0, -1,
         "  drizzle four.fits -x 0.1 --pixfrac 0.5 -o deep.fits\n"
         "  drizzle a.fits b.fits --weight a.fits[WHT] --weight b.fits[WHT] --like grid.fits --flat -o deep.fits\n"
     };

@@ -4,13 +4,13 @@
  */
 #include "catkeys.h"
 #include "err.h"
+#include "exposure.h"
 #include "imageio.h"
 #include "opt.h"
 #include "outfile.h"
 #include "psfio.h"
 #include "region.h"
 #include "shapecat.h"
-#include "sky.h"
 #include "starpsf.h"
 #include "tableio.h"
 #include <math.h>
@@ -21,6 +21,8 @@
 
 struct params {
     const char *stars, *psf, *weight, *segmentation, *region;
+    char *star_image;         /* of --stars IMAGE,CATALOGUE, or NULL */
+    const char *star_cat;
     double width, fixed, min, max, cut, scale, pixel;
     int fourth, correction, average;
     int centroid, no_recenter, no_background, stars_only;
@@ -62,6 +64,8 @@ static void read_pixels(struct input *in, const char *name, double max_memory)
     if (k < 0)
         die(EXIT_RUN, "%s: no image in this file", name);
     const struct hdu *h = fits_in_hdu(f, k);
+    if (h->nz != 1)
+        die(EXIT_RUN, "%s: HDU %d has %ld planes: a plain image is needed", name, k, h->nz);
     int deep = h->bitpix == -64;
     size_t n = (size_t)h->nx * (size_t)h->ny, size = deep ? sizeof(double) : sizeof(float);
     if (max_memory > 0 && (double)n * (double)size > max_memory)
@@ -83,23 +87,14 @@ static void read_pixels(struct input *in, const char *name, double max_memory)
 }
 
 /* arcsec per pixel: option, header, world coordinates, catalogue; else NaN. */
-static double pixel_scale(const struct input *in, double option)
+static double pixel_scale(const struct input *in, const struct exposure *x, double option)
 {
-    struct sky *s;
     double v;
     if (option > 0)
         return option;
-    if (header_double(&in->hdr, "PIXSCALE", &v) == OK && v > 0)
-        return v;
-    if (sky_open(&s, &in->hdr, NULL) == OK) {
-        v = sky_scale(s);
-        sky_close(s);
-        if (v > 0)
-            return v;
-    }
-    if (table_key_number(&in->cat, "PIXSCALE", &v) == OK && v > 0)
-        return v;
-    return NAN;
+    if (isfinite(x->scale))
+        return x->scale;
+    return table_key_number(&in->cat, "PIXSCALE", &v) == OK && v > 0 ? v : NAN;
 }
 
 static void read_map(struct image *im, const struct input *in, const char *name, double max_memory)
@@ -116,12 +111,15 @@ static void read_input(struct input *in, const char *image, const char *cat, con
                        const char *weight, const char *label, double max_memory)
 {
     struct err e;
+    struct exposure x = {0};
     *in = (struct input){0};
     read_pixels(in, image, max_memory);
+    if (exposure_keywords(&in->hdr, image, &x, &e))
+        die(EXIT_RUN, "%s", e.text);
     if (table_read(&in->cat, cat, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     in->map = (struct moments_map){.nx = in->nx, .ny = in->ny, .pix = in->pix, .pix64 = in->pix64,
-                                   .gain = header_double_or(&in->hdr, "GAIN", 0),
+                                   .gain = isfinite(x.gain) ? x.gain : 0,
                                    .noise_cor = header_double_or(&in->hdr, "NOISECOR", 1)};
     if (weight) {
         char type[72] = "";
@@ -133,7 +131,7 @@ static void read_input(struct input *in, const char *image, const char *cat, con
         read_map(&in->label, in, label, max_memory);
         in->map.label = in->label.pix;
     }
-    in->scale = pixel_scale(in, p->scale);
+    in->scale = pixel_scale(in, &x, p->scale);
 }
 
 static void free_input(struct input *in)
@@ -253,21 +251,16 @@ static struct starmom *find_psf(struct starmom *s, const struct input *in, const
         known_psf(s, p->psf, in, p->pixel, c->max_memory);
         return s;
     }
-    const char *comma = strrchr(p->stars, ',');
-    if (!comma || access(p->stars, F_OK) == 0) {
+    if (!p->star_image) {
         read_curve(s, p->stars, in, c->max_memory, own);
         return s;
     }
     struct input stars;
-    char *image = strndup(p->stars, (size_t)(comma - p->stars));
-    if (!image)
-        die(EXIT_RUN, "%s: %s", p->stars, err_text(E_NOMEM));
-    read_input(&stars, image, comma + 1, p, NULL, NULL, c->max_memory);
+    read_input(&stars, p->star_image, p->star_cat, p, NULL, NULL, c->max_memory);
     if (isfinite(in->scale) && !(fabs(stars.scale / in->scale - 1) < 1e-6))
-        die(EXIT_RUN, "%s: pixels of %g arcsec, but %s has %g", image, stars.scale, in->name, in->scale);
-    measure_stars(s, &stars, comma + 1, p, c->threads, own);
+        die(EXIT_RUN, "%s: pixels of %g arcsec, but %s has %g", p->star_image, stars.scale, in->name, in->scale);
+    measure_stars(s, &stars, p->star_cat, p, c->threads, own);
     free_input(&stars);
-    free(image);
     return s;
 }
 
@@ -288,15 +281,37 @@ static void set_psf(struct table *t, const struct starmom *s, double own, double
         check(table_set_number(t, "PIXSCALE", scale), "PIXSCALE");
 }
 
+enum { INPUTS = 8 };
+
+/* The files that no output may replace; their number. */
+static size_t inputs_of(const struct params *p, const struct common *c, const char *name[INPUTS])
+{
+    const char *all[INPUTS] = {c->argv[0], c->argv[1], p->stars, p->star_image, p->star_cat, p->psf, p->weight, p->segmentation};
+    size_t n = 0;
+    for (size_t i = 0; i < INPUTS; i++)
+        if (all[i])
+            name[n++] = all[i];
+    return n;
+}
+
+/* --stars IMAGE,CATALOGUE is two files, unless one has that name. */
+static void split_stars(struct params *p)
+{
+    const char *comma = p->stars && access(p->stars, F_OK) ? strrchr(p->stars, ',') : NULL;
+    if (!comma)
+        return;
+    p->star_cat = comma + 1;
+    p->star_image = strndup(p->stars, (size_t)(comma - p->stars));
+    if (!p->star_image)
+        die(EXIT_RUN, "%s: %s", p->stars, err_text(E_NOMEM));
+}
+
 static void write_catalogue(const struct table *t, const struct program *prog, const struct opt *own,
                             const struct params *p, const struct common *c)
 {
     struct err e;
-    const char *all[] = {c->argv[0], c->argv[1], p->stars, p->psf, p->weight, p->segmentation}, *inputs[6];
-    size_t n = 0;
-    for (size_t i = 0; i < 6; i++)
-        if (all[i])
-            inputs[n++] = all[i];
+    const char *inputs[INPUTS];
+    const size_t n = inputs_of(p, c, inputs);
     char *record = opt_record(prog, own, c);
     if (table_write(t, c->out, record, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
@@ -308,12 +323,13 @@ static void write_region(const struct table *t, const struct params *p, const st
 {
     struct err e;
     struct region *r;
-    const char *inputs[] = {c->argv[0], c->argv[1]};
+    const char *inputs[INPUTS];
+    const size_t n = inputs_of(p, c, inputs);
     const double *x = table_reals(t, "X_RRG"), *y = table_reals(t, "Y_RRG"), *w = table_reals(t, "WIDTH");
     const double *xx = table_reals(t, "JXX_RAW"), *xy = table_reals(t, "JXY_RAW"), *yy = table_reals(t, "JYY_RAW");
     const int64_t *flags = table_ints(t, "FLAGS_RRG");
     const struct column *number = table_find(t, "NUMBER");
-    if (region_open(&r, p->region, inputs, 2, &e))
+    if (region_open(&r, p->region, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     for (size_t i = 0; i < t->nrow; i++) {
         const double mean = 0.5 * (xx[i] + yy[i]), half = 0.5 * hypot(xx[i] - yy[i], 2 * xy[i]);
@@ -397,8 +413,8 @@ int main(int argc, char **argv)
     const struct program prog = {
         "rrgshape", "measure shapes: Gaussian-weighted moments corrected for the PSF, response to shear",
         "IMAGE CATALOGUE", 2, 2,
-        "rrgshape --stars-only stars.fits stars.cat -o stars.rrg\n"
-        "rrgshape image.fits image.cat --stars stars.rrg -o image.shapes"};
+        "  rrgshape --stars-only stars.fits stars.cat -o stars.rrg\n"
+        "  rrgshape image.fits image.cat --stars stars.rrg -o image.shapes"};
     const struct opt own[] = {
         {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file, or STARS_IMAGE,STARS_CATALOGUE", NULL, 1},
         {"psf", 'p', OPT_STR, &p.psf, 0, 0, "FILE", "PSF file instead of stars; none: no correction", NULL, 1},
@@ -429,6 +445,7 @@ int main(int argc, char **argv)
 
     if (p.region && (p.stars_only || outfile_same(p.region, c.out)))
         die(EXIT_USAGE, "--region %s: not with --stars-only, and not the output", p.region);
+    split_stars(&p);
     struct input in;
     struct table curve = {0};
     read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);
@@ -440,5 +457,6 @@ int main(int argc, char **argv)
         write_catalogue(p.stars_only ? &curve : &in.cat, &prog, own, &p, &c);
     table_free(&curve);
     free_input(&in);
+    free(p.star_image);
     return EXIT_DONE;
 }

@@ -475,7 +475,7 @@ int main(int argc, char **argv)
     struct common c = COMMON_DEFAULTS;
     struct request r = {.subpixel = 1, .exptime = 2000, .zeropoint = 26.65, .centre = {150, 2.2}, .accuracy = ACCURACY_DEFAULT};
     const struct program prog = {
-        "simage", "Draw the expected electrons of a scene: shear, PSF, charge diffusion, pixels.", "[SCENE]", 0, 1,
+        "simage", "draw the expected electrons of a scene: shear, PSF, charge diffusion, pixels", "[SCENE]", 0, 1,
         "  simage scene.txt --models models.txt -p psf.fits -x 0.1 --shear 0.05,0 -o image.fits\n"
         "  simage stars.txt -p psf.fits -x 0.1 --size 800,800 | addnoise --depth 27.7 | detect -\n"
     };

@@ -372,17 +372,28 @@ static int short_options(const struct parser *p, int i)
     return i;
 }
 
+static int allowed(const struct opt *o, double v)
+{
+    return v >= o->lo && v <= o->hi;
+}
+
+/* A value that could not be typed stands for "not given"; a line that tells the default itself needs no other. */
 static void print_default(const struct opt *o)
 {
+    if (strstr(o->help, "default"))
+        return;
     switch (o->type) {
-    case OPT_LONG: printf(" [%ld]", *(const long *)o->value); break;
+    case OPT_LONG:
+        if (allowed(o, (double)*(const long *)o->value))
+            printf(" [%ld]", *(const long *)o->value);
+        break;
     case OPT_REAL:
-        if (isfinite(*(const double *)o->value))
+        if (allowed(o, *(const double *)o->value))
             printf(" [%.10g]", *(const double *)o->value);
         break;
     case OPT_PAIR: {
         const double *v = o->value;
-        if (isfinite(v[0]) && isfinite(v[1]))
+        if (allowed(o, v[0]) && allowed(o, v[1]))
             printf(" [%.10g,%.10g]", v[0], v[1]);
         break;
     }
@@ -423,7 +434,7 @@ static void help_line(const struct opt *o)
 
 static void help(const struct parser *p)
 {
-    printf("usage: %s [OPTION]... %s\n%s\n\n", p->prog->name, p->prog->operands, p->prog->what);
+    printf("usage: %s [OPTION]...%s%s\n%s\n\n", p->prog->name, *p->prog->operands ? " " : "", p->prog->operands, p->prog->what);
     for (const struct opt *o = p->own; o->name; o++)
         help_line(o);
     printf("\n");

@@ -1,8 +1,11 @@
 /* region.c - ellipses for DS9. */
 #include "region.h"
 #include "outfile.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+
+static const double REACH = 1e9;       /* pixels */
 
 struct region {
     struct outfile *f;
@@ -30,6 +33,8 @@ int region_open(struct region **r, const char *name, const char *const *inputs, 
 void region_ellipse(struct region *r, double x, double y, double a, double b, double theta, size_t number, const char *colour)
 {
     char line[256];
+    if (!(fabs(x) < REACH && fabs(y) < REACH && a < REACH && b < REACH && fabs(theta) < REACH))
+        return;
     int len = snprintf(line, sizeof line, "ellipse(%.3f,%.3f,%.3f,%.3f,%.2f) # %s%s%stext={%zu}\n", x, y, a, b, theta,
                        colour ? "color=" : "", colour ? colour : "", colour ? " " : "", number);
     if (!r->st)

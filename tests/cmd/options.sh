@@ -19,6 +19,7 @@ for p in "$BIN"/*; do
     if [ $st -eq 0 ] && [ ! -s help.err ] && grep -q "^usage: $n " help.txt; then pass "$n --help"; else fail "$n --help (exit $st)"; fi
     between "$n --help, lines" "$(wc -l <help.txt)" 12 75
     near "$n --help, lines longer than 120 characters" "$(awk 'length > 120' help.txt | wc -l)" 0 0
+    near "$n --help, lines that tell two defaults" "$(grep -c 'default.*\[[^]]*\]$' help.txt)" 0 0
     if "$n" --version | grep -qx "$n (pixshear) [0-9.]*"; then pass "$n --version"; else fail "$n --version"; fi
     for o in --output --seed --threads --max-memory --check --verbose --quiet --help --version; do
         grep -q -- "$o" help.txt || fail "$n --help lacks $o"

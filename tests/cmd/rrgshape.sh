@@ -91,7 +91,13 @@ near "the first object's ellipse: 2 sqrt(Jxx) = 4.16" "$(grep -m1 '^ellipse(20\.
 near "one for each with a position that is a number" "$(grep -c '^ellipse' im.reg)" 4 0
 near "red where there is a flag" "$(grep -c 'color=red text' im.reg)" "$(paste <(col reg.out FLAGS_RRG) <(col reg.out X_RRG) | grep -v nan | awk '$1' | wc -l)" 0
 fails "--region is the output" 2 rrgshape im.fits im.cat --psf none --region reg.out -o reg.out
-fails "--region is an input" 1 rrgshape im.fits im.cat --psf none --region im.cat -o reg.out
+stamp 64 64 "27 30 20 2" >map.fits; cp map.fits map.kept
+for o in im.cat map.fits; do fails "--region is an input, $o" 1 rrgshape im.fits im.cat --psf none --weight map.fits --segmentation map.fits --region $o -o reg.out; done
+same "and stays" map.fits map.kept
+printf '1 1e300 30 1e300 1e300\n2 20 30 2.5 2.5\n' | rows >far.cat
+ok "--region of a position beyond everything" rrgshape im.fits far.cat --psf none --region far.reg -o far.out
+if LC_ALL=C grep -vqxE '#.*|global.*|image|ellipse\([-0-9.,]*\) # (color=red )?text=\{[0-9]+\}' far.reg; then fail "the region file has other lines: $(head -c 400 far.reg)"; else pass "ellipses and nothing else"; fi
+near "one ellipse for the other" "$(grep -c '^ellipse' far.reg)" 1 0
 rrgshape - im.cat --psf none <im.fits >pipe.out
 near "image from a pipe" "$(paste <(col im.out JXX_RAW) <(col pipe.out JXX_RAW) | awk '$1 != $2' | wc -l)" 0 0
 rrgshape im.fits im.out --psf none -o again.out
@@ -135,6 +141,11 @@ sed 's/A_IMAGE/A_OTHER/' im.cat >bad.cat; fails "column missing" 1 rrgshape im.f
 head -c 5000 im.fits >short.fits; fails "truncated image" 1 rrgshape short.fits im.cat --psf none -o short.out
 if [ -e short.out ]; then fail "truncated image leaves an output"; else pass "truncated image leaves no output"; fi
 stamp 32 32 "9 9 9 1" >small.fits; fails "segmentation of another size" 1 rrgshape im.fits im.cat --psf none --segmentation small.fits
+for k in "PIXSCALE=                  0.1/PIXSCALE=                 -0.1" "GAIN    =                  1.0/GAIN    =                  0.0" "GAIN    =                  1.0/GAIN    = 'one'               " "SHEAR2  =                  0.0/EXPTIME =                  0.0"; do
+    sed "s/$k/" im.fits >odd.fits; fails "image with ${k#*/}" 1 rrgshape odd.fits im.cat --psf none
+done
+perl "$TOP/tests/fits.pl" make cube.fits 8 8 1 'PIXSCALE=                  0.1'; perl -pi -e 's/NAXIS   =                    2/NAXIS   =                    3/; s/EXTEND  =                    T/NAXIS3  =                    3/' cube.fits
+fails "a cube" 1 rrgshape cube.fits im.cat --psf none
 if [ -x "$BIN/psfgen" ]; then
     ok "PSF of the default telescope" psfgen -o psf.fits
     ok "moments of the exact ePSF" rrgshape im.fits im.cat --psf psf.fits -o psf.out
@@ -156,6 +167,12 @@ if [ -x "$BIN/psfgen" ]; then
     scatter() { for s in 1 2 3 4 5 6 7 8 9 10 11 12; do echo "$(col st$s.out $1 | sed -n 2p) $(col st$s.out $1ERR_STARS | sed -n 2p)"; done |
         awk '{ a += $1; b += $1 * $1; v += $2 * $2 } END { print sqrt((b - a * a / NR) / (NR - 1) / (v / NR)) }'; }
     # a spread by 12 values is known to 21 %; three of them
+    for o in st.fits st.cat; do
+        cp $o kept
+        fails "stars measured in the same run: the output is $o" 1 rrgshape -q im.fits im.cat --stars st.fits,st.cat -o $o
+        fails "the region file is $o" 1 rrgshape -q im.fits im.cat --stars st.fits,st.cat --region $o -o reg.out
+        same "and $o stays" $o kept
+    done
     near "E1ERR_STARS against the scatter of E1 over 12 star fields" "$(scatter E1)" 1 0.63
     near "E2ERR_STARS against the scatter of E2" "$(scatter E2)" 1 0.63
     near "noise and stars add to E1ERR" "$(paste <(col st1.out E1ERR) <(col st1.out E1ERR_STARS) <(col psf.out E1ERR) | awk 'NR == 2 { print $1 / sqrt($2 * $2 + $3 * $3) }')" 1 0.02
