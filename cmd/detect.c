@@ -13,6 +13,7 @@
 #include "ldac.h"
 #include "opt.h"
 #include "outfile.h"
+#include "pages.h"
 #include "region.h"
 #include "progress.h"
 #include "segment.h"
@@ -144,6 +145,7 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     struct err e;
     if (image_read(&f->im, in, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
+    pages_keep(image_count(&f->im) * sizeof(float));
     double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0) + (o->measure_weight ? 4 : 0)) + 32 * 1048576.0;
     if (need > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);

@@ -3,16 +3,27 @@
 #include "pages.h"
 #include <stdlib.h>
 
-int image_new(struct image *im, long nx, long ny)
+static int take(struct image *im, long nx, long ny, int clear)
 {
     if (nx < 1 || ny < 1 || nx > 65535 || ny > 65535)
         return E_RANGE;
-    float *pix = calloc((size_t)nx * (size_t)ny, sizeof *pix);
+    size_t n = (size_t)nx * (size_t)ny;
+    float *pix = clear ? calloc(n, sizeof *pix) : pages_block(n * sizeof *pix);
     if (!pix)
         return E_NOMEM;
-    pages_large(pix, (size_t)nx * (size_t)ny * sizeof *pix);
+    pages_large(pix, n * sizeof *pix);
     *im = (struct image){.nx = nx, .ny = ny, .pix = pix};
     return OK;
+}
+
+int image_new(struct image *im, long nx, long ny)
+{
+    return take(im, nx, ny, 1);
+}
+
+int image_room(struct image *im, long nx, long ny)
+{
+    return take(im, nx, ny, 0);
 }
 
 void image_free(struct image *im)

@@ -22,6 +22,9 @@ struct image {
 /* nx*ny zeros and an empty header; sides 1..65535. E_RANGE, E_NOMEM. */
 MUST_CHECK int image_new(struct image *im, long nx, long ny);
 
+/* The same with pixels of no particular value, for whoever sets all of them. */
+MUST_CHECK int image_room(struct image *im, long nx, long ny);
+
 /* Free what im owns and clear it; im may be empty. */
 void image_free(struct image *im);
 

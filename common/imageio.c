@@ -468,7 +468,7 @@ static int read_selected(struct image *im, struct fits_in *f, double max_memory,
     if (!(bytes <= max_memory))
         return err_set(e, E_NOMEM, "%s: %ld x %ld pixels need %.3g MB, more than --max-memory", name,
                        h->nx, h->ny, bytes * 1e-6);
-    int st = image_new(im, h->nx, h->ny);
+    int st = image_room(im, h->nx, h->ny);
     if (st)
         return err_set(e, st, "%s: %ld x %ld pixels: %s", name, h->nx, h->ny,
                        st == E_RANGE ? "a side is longer than 65535" : err_text(st));

@@ -1,9 +1,13 @@
 /* pages.c - large blocks of memory in large pages: the whole 2 MiB pages inside a block, its ragged ends stay small. */
 #include "pages.h"
 #include <stdint.h>
+#include <stdlib.h>
 #include <sys/mman.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
-enum { LARGE = 2 << 20 };
+enum { LARGE = 2 << 20, MAPPED = 32 << 20, STEP = 1 << 20, KEPT = 1 << 30 };
 
 void pages_large(void *p, size_t bytes)
 {
@@ -15,6 +19,31 @@ void pages_large(void *p, size_t bytes)
     (void)madvise((void *)begin, end - begin, MADV_HUGEPAGE);
 #else
     (void)p;
+    (void)bytes;
+#endif
+}
+
+void *pages_block(size_t bytes)
+{
+    void *p;
+    if (bytes < 2 * (size_t)LARGE)
+        return malloc(bytes);
+    return posix_memalign(&p, LARGE, bytes) ? NULL : p;
+}
+
+void pages_keep(size_t bytes)
+{
+#ifdef __GLIBC__
+    (void)mallopt(M_MMAP_THRESHOLD, MAPPED);
+    (void)mallopt(M_TRIM_THRESHOLD, KEPT);
+    (void)mallopt(M_TOP_PAD, STEP);
+    (void)mallopt(M_ARENA_MAX, 1);
+    if (bytes > MAPPED / 2)
+        bytes = MAPPED / 2;
+    void *p = bytes >= 2 * (size_t)LARGE ? malloc(bytes) : NULL;
+    pages_large(p, bytes);
+    free(p);
+#else
     (void)bytes;
 #endif
 }

@@ -12,4 +12,13 @@
 /* Advise large pages for `bytes` at p, not touched yet; a hint that never fails.  Blocks below 4 MiB are left alone. */
 void pages_large(void *p, size_t bytes);
 
+/* malloc(); from 4 MiB on the block begins where a large page can begin. */
+void *pages_block(size_t bytes);
+
+/*
+ * Memory that is freed stays with the program for its next block instead of costing the same faults again (in all
+ * threads; blocks of 32 MiB and more still go back), and the next `bytes` of it (of at most 16 MiB) come in large pages.
+ */
+void pages_keep(size_t bytes);
+
 #endif

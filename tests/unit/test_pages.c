@@ -44,6 +44,30 @@ int main(void)
         check_skip("large pages: this system has none");
     image_free(&im);
 
+    if (check_that(image_room(&im, 2048, 1030) == OK, "room for an image of 2048 x 1030")) {
+        check_that((size_t)(void *)im.pix % ((size_t)2 << 20) == 0, "it begins where a large page can");
+        before = faults();
+        for (size_t i = 0; i < image_count(&im); i += 1024)
+            im.pix[i] = 1.0f;
+        if (system_has_them())
+            check_that(faults() - before < 1030, "2060 small pages cost fewer than 1030 faults");
+        image_free(&im);
+    }
+
+    pages_keep((size_t)8 << 20);
+    long again = 0;
+    for (int k = 0; k < 20; k++) {         /* what was freed is there for the next */
+        before = faults();
+        char *block = malloc(4000000);
+        if (!check_that(block != NULL, "a block of 4 MB"))
+            break;
+        for (size_t i = 0; i < 4000000; i += 1024)
+            block[i] = 1;
+        free(block);
+        again = faults() - before;
+    }
+    check_that(again < 100, "a block that takes the place of one of its size costs no new pages");
+
     pages_large(NULL, 0);
     pages_large(NULL, (size_t)1 << 30);
     char *p = malloc(5000000);
