@@ -209,6 +209,7 @@ int main(int argc, char **argv)
         {"median", 0, OPT_FLAG, &o.median, 0, 0, NULL, "median instead of mean response", NULL, 0},
         {"fit-line", 0, OPT_FLAG, &o.fit_line, 0, 0, NULL, "correct sigma with the slopes of the fits, not of the pairs", NULL, 0},
         {"bins", 'b', OPT_STR, &bin_text, 0, 0, "NAME:LIST", "a row for each bin of a column, SNR, SIZE or DISTANCE between the edges of the list", NULL, 0},
+        {"bins-everywhere", 0, OPT_FLAG, &o.everywhere, 0, 0, NULL, "common objects must be in the bin in every image, not only the unsheared one", NULL, 0},
         {"against", 0, OPT_CHOICE, &against, 0, 0, "WHAT", "slopes against the shear, or the ellipticity of the PSF (leakage)", "shear|psf", 0},
         {"draws", 0, OPT_LONG, &o.draws, 0, 100000, "N", "bootstrap resamplings", NULL, 0},
         {"table", 't', OPT_FLAG, &text, 0, 0, NULL, "write a short aligned table for people, not a catalogue", NULL, 0},
@@ -217,6 +218,8 @@ int main(int argc, char **argv)
     o.seed = c.seed;
 
     size_t n = (size_t)c.argc;
+    if (o.everywhere && !bin_text)
+        die(EXIT_USAGE, "--bins-everywhere needs --bins");
     if (bin_text)
         parse_bins(&bins, bin_text);
     o.psf = against == 1;

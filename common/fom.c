@@ -289,7 +289,9 @@ static void effective(struct group *s, const double var_e[2])
 static int pairs(struct group *s, int c)
 {
     struct fom_pairs p;
-    int st = fom_pairs(s->n, s->im, c, s->o->psf, s->o->radius, s->o->draws, s->o->seed, &p);
+    const struct fom_pair_options o = {.psf = s->o->psf, .everywhere = s->o->everywhere, .radius = s->o->radius,
+                                       .draws = s->o->draws, .seed = s->o->seed};
+    int st = fom_pairs(s->n, s->im, c, &o, &p);
     double *v = s->v + (c ? FOM_PAIRS2 : FOM_PAIRS1), *m = s->v + (c ? FOM_SEL2 : FOM_SEL1);
     if (st)
         return st;

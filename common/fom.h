@@ -19,6 +19,7 @@
 
 struct fom_options {
     double radius;            /* largest distance of common objects, arcsec */
+    int everywhere;           /* common objects lie in the bin in every image, not only in the g = 0 one */
     int psf;                  /* slopes are against the PSF's ellipticity (leakage), not the shear */
     int median;               /* median instead of mean in G */
     int fit_line;             /* correct sigma with the slopes of the fits even where pairs give better ones */

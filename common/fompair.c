@@ -137,7 +137,7 @@ static const struct fom_object *matched(const struct side *s, size_t i)
     return s->at[i] < 0 ? NULL : &s->im->object[s->at[i]];
 }
 
-static int add_common(struct common *all, const struct field *f, int c)
+static int add_common(struct common *all, const struct field *f, int c, int everywhere)
 {
     if (all->n + f->list->n > all->cap) {
         size_t cap = all->n + f->list->n;
@@ -164,7 +164,7 @@ static int add_common(struct common *all, const struct field *f, int c)
         size_t k = f->list->object[i].listed ? 0 : f->n + 1;
         for (; k < f->n; k++) {
             const struct fom_object *o = matched(&f->side[k], i);
-            if (!o || !o->passes)
+            if (!o || !o->passes || (everywhere && !o->listed))
                 break;
             r += f->side[k].weight * o->e[c];
             g += 0.5 * (o->p[0] + o->p[1]) / m;
@@ -317,8 +317,8 @@ static int is_first(size_t n, const struct fom_image *const *im, size_t i)
     return 1;
 }
 
-int fom_pairs(size_t n, const struct fom_image *const *im, int component, int psf, double radius, long draws,
-              uint64_t seed, struct fom_pairs *out)
+int fom_pairs(size_t n, const struct fom_image *const *im, int component, const struct fom_pair_options *o,
+              struct fom_pairs *out)
 {
     const struct ratio none = {.value = NAN, .se = NAN, .jackknife = NAN, .bootstrap = NAN};
     struct fom_pairs r = {.scalar = none, .tensor = none, .scalar_block = NAN, .tensor_block = NAN, .response = NAN, .mean = NAN, .mean_se = NAN, .total = NAN,
@@ -327,7 +327,7 @@ int fom_pairs(size_t n, const struct fom_image *const *im, int component, int ps
     struct sums sum[LEVELS] = {{0}};
     struct common all = {0};
     struct levels levels;
-    find_levels(&levels, n, im, component, psf);
+    find_levels(&levels, n, im, component, o->psf);
     int st = OK;
     struct field *f = calloc(n + 1, sizeof *f);
     size_t fields = 0;
@@ -335,9 +335,9 @@ int fom_pairs(size_t n, const struct fom_image *const *im, int component, int ps
         return E_NOMEM;
     for (size_t i = 0; i < n && levels.n > 0 && st == OK; i++)
         if (is_first(n, im, i)) {
-            st = field_open(&f[fields], n, im, im[i]->field, component, &levels, radius);
+            st = field_open(&f[fields], n, im, im[i]->field, component, &levels, o->radius);
             if (st == OK)
-                st = add_common(&all, &f[fields++], component);
+                st = add_common(&all, &f[fields++], component, o->everywhere);
         }
     if (st == OK && fields > 0) {
         for (size_t j = 0; j < fields; j++)
@@ -345,7 +345,7 @@ int fom_pairs(size_t n, const struct fom_image *const *im, int component, int ps
         for (size_t j = 0; j < fields; j++)
             add_variance(var, sum, &f[j], component);
         means(&r, sum, var, f, fields);
-        st = ratios(&r, &all, n, draws, seed);
+        st = ratios(&r, &all, n, o->draws, o->seed);
     }
     for (size_t j = 0; j < fields; j++)
         field_free(&f[j]);

@@ -29,12 +29,20 @@ struct fom_pairs {
     double total, total_se;
 };
 
+struct fom_pair_options {
+    int psf;                  /* slopes against the ellipticity of the PSF */
+    int everywhere;           /* a common galaxy is listed (in the bin) in every image, not only in the list */
+    double radius;            /* largest distance of common objects, arcsec */
+    long draws;               /* bootstrap resamplings */
+    uint64_t seed;
+};
+
 /*
  * Pairs are found among images with the other component zero.  The g = 0 image
  * of a field is its list of galaxies (without one, and with psf: the first
  * image, and no selection response); only galaxies listed there count as common.  Undefined values are NaN.
  */
-MUST_CHECK int fom_pairs(size_t n, const struct fom_image *const *im, int component, int psf, double radius,
-                         long draws, uint64_t seed, struct fom_pairs *out);
+MUST_CHECK int fom_pairs(size_t n, const struct fom_image *const *im, int component, const struct fom_pair_options *o,
+                         struct fom_pairs *out);
 
 #endif

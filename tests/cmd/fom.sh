@@ -62,6 +62,13 @@ near "all of a grid have neighbours at 3 arcsec" "$(col dist.cat NPAIR1 | tr '\n
 for k in 0 1 2 3 4 5 6 7 8; do sed 's/P22 CUT$/P22 D_RRG/' a$k >size$k; done
 ok "bins of the size: D_RRG 0 in all" fom size? --bins SIZE:-1,1 -q -o size.cat
 near "size in one bin" "$(col size.cat NPAIR1)" 400 0
+# object 7 leaves the bin in one image, object 9 is in it in one image only
+for k in 0 1 2 3 4 5 6 7 8; do awk -v k=$k '/^#/ { print; next } { s = $1 <= 300; if ($1 == 7 && k == 1) s = 0; if ($1 == 9 && k != 0) s = 0; if ($1 == 305 && k != 0) s = 1; $1 = s; print }' a$k >all$k; done
+fom all? -q --bins NUMBER:0.5,2 -o some.cat; fom all? -q --bins NUMBER:0.5,2 --bins-everywhere -o every.cat
+near "bins by the g = 0 image" "$(col some.cat NPAIR1)" 300 0
+near "--bins-everywhere: without those that leave it" "$(col every.cat NPAIR1)" 298 0
+near "of the component whose images they leave it in" "$(col every.cat NPAIR2)" 299 0
+fails "--bins-everywhere without bins" 2 fom a0 --bins-everywhere
 fails "bins without edges" 2 fom a0 --bins NUMBER
 fails "bins of falling edges" 2 fom a0 --bins NUMBER:2,1
 fails "bins of an unknown column" 1 fom a0 --bins MAG:1,2
