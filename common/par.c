@@ -179,3 +179,78 @@ void par_team_free(struct par_team *team)
     pthread_mutex_destroy(&team->lock);
     free(team);
 }
+
+/* ---- turns ---- */
+
+struct par_turns {
+    pthread_mutex_t lock;
+    pthread_cond_t moved;
+    int status;
+    long items, next;         /* next: not taken */
+    long turn[];              /* item whose turn it is, of each place */
+};
+
+struct par_turns *par_turns_new(int places, long items)
+{
+    struct par_turns *t = places > 0 ? calloc(1, sizeof *t + (size_t)places * sizeof t->turn[0]) : NULL;
+    if (!t)
+        return NULL;
+    t->items = items;
+    if (pthread_mutex_init(&t->lock, NULL) || pthread_cond_init(&t->moved, NULL)) {
+        free(t);
+        return NULL;
+    }
+    return t;
+}
+
+long par_turn_take(struct par_turns *t)
+{
+    pthread_mutex_lock(&t->lock);
+    const long item = t->next < t->items && t->status == OK ? t->next++ : -1;
+    pthread_mutex_unlock(&t->lock);
+    return item;
+}
+
+int par_turn_ready(struct par_turns *t, int place, long item)
+{
+    pthread_mutex_lock(&t->lock);
+    const int ready = t->turn[place] == item || t->status != OK;
+    pthread_mutex_unlock(&t->lock);
+    return ready;
+}
+
+int par_turn_wait(struct par_turns *t, int place, long item)
+{
+    pthread_mutex_lock(&t->lock);
+    while (t->turn[place] != item && t->status == OK)
+        pthread_cond_wait(&t->moved, &t->lock);
+    const int st = t->status;
+    pthread_mutex_unlock(&t->lock);
+    return st;
+}
+
+void par_turn_end(struct par_turns *t, int place)
+{
+    pthread_mutex_lock(&t->lock);
+    t->turn[place]++;
+    pthread_cond_broadcast(&t->moved);
+    pthread_mutex_unlock(&t->lock);
+}
+
+void par_turns_fail(struct par_turns *t, int status)
+{
+    pthread_mutex_lock(&t->lock);
+    if (t->status == OK)
+        t->status = status;
+    pthread_cond_broadcast(&t->moved);
+    pthread_mutex_unlock(&t->lock);
+}
+
+void par_turns_free(struct par_turns *t)
+{
+    if (!t)
+        return;
+    pthread_cond_destroy(&t->moved);
+    pthread_mutex_destroy(&t->lock);
+    free(t);
+}

@@ -36,4 +36,18 @@ struct par_team *par_team_new(int threads);
 MUST_CHECK int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void *ctx);
 void par_team_free(struct par_team *team);
 
+/*
+ * Turns: items that work side by side, but come to each of some places (strips of an image, say) in the order of their
+ * numbers.  A thread takes items one by one, holds as many as it likes, and brings each through all places in the
+ * order of places and items; so the lowest unfinished item never waits for another.
+ */
+struct par_turns;
+struct par_turns *par_turns_new(int places, long items);         /* NULL: no memory */
+long par_turn_take(struct par_turns *t);                         /* 0, 1, 2 ...; -1: no more, or a failure */
+int par_turn_ready(struct par_turns *t, int place, long item);   /* would it not wait? */
+MUST_CHECK int par_turn_wait(struct par_turns *t, int place, long item);    /* OK, or what par_turns_fail was told */
+void par_turn_end(struct par_turns *t, int place);
+void par_turns_fail(struct par_turns *t, int status);            /* nobody waits any longer */
+void par_turns_free(struct par_turns *t);
+
 #endif

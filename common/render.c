@@ -7,13 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define BATCH_PIXELS 524288    /* doubles held by one batch of stamps: 4 MiB */
-#define PAIR_PIXELS 1310720    /* of two batches, one drawn while the other is added, for several threads: 10 MiB */
+#define HELD 4                 /* chunks that a thread holds, drawn and not yet added, at most */
+#define CHUNK_PIXELS 16384     /* doubles of a chunk of stamps: with HELD of them 512 KiB, half a core's cache */
+#define SPACE_PIXELS 1310720   /* doubles that all threads may hold of stamps larger than that: 10 MiB */
 #define WINDOW_PIXELS 1048576  /* doubles of the window, at most */
 #define PART_PIXELS 1048576    /* pixels, about, of one part of a stamp without a PSF */
-#define SHARES 48              /* pieces into which a batch is cut for the threads */
 #define PAGE_FLOATS 1024       /* in the smallest page of memory */
-#define STRIPS 8               /* columns of the image added by one thread */
+#define STRIPS 8               /* of columns of the image, in each of which one thread adds */
 #define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
 
 /* Objects to draw: tall stamps first, then in order of their first row in the image, then of their number. */
@@ -118,15 +118,10 @@ static int by_row(const void *a, const void *b)
 struct worker {
     struct stamp_work *work;
     double *scratch;
-};
-
-/* Pieces drawn together, and the space that they share. */
-struct batch {
-    const struct entry *entry;
-    size_t n;
-    double **stamp;                /* where each goes */
-    double *space;
-    size_t size;                   /* doubles */
+    double *space;                 /* of the stamps of all chunks held */
+    int held;                      /* chunks drawn and not yet added */
+    long chunk[HELD];              /* their numbers, the oldest first */
+    double *stamp[HELD];           /* and stamps */
 };
 
 /*
@@ -190,64 +185,102 @@ static void strip_add(struct window *w, int strip, const struct draw *d, const s
     }
 }
 
-/* One step: add the pieces of one batch, strip by strip, and draw those of the next. */
-struct job {
-    const struct plan *p;
-    struct window *w;
-    struct worker *worker;
-    struct progress *bar;
-    const struct batch *add, *draw;
-};
-
-static void add_strip(const struct job *j, int strip)
-{
-    for (size_t i = 0; i < j->add->n; i++) {
-        const struct entry *e = &j->add->entry[i];
-        const struct piece q = piece_of(j->p, e);
-        strip_add(j->w, strip, &j->p->draw[e->index], &q, e->row < 0, j->add->stamp[i]);
-    }
-}
-
-static int add_and_draw(void *ctx, long begin, long end, int worker)
-{
-    const struct job *j = ctx;
-    const struct worker *w = &j->worker[worker];
-    const long strips = j->add->n ? STRIPS : 0;
-    long drawn = 0;
-    for (long i = begin; i < end; i++) {
-        if (i < strips) {
-            add_strip(j, (int)i);
-            continue;
-        }
-        const struct entry *e = &j->draw->entry[i - strips];
-        int st = draw_piece(j->p, e, w->work, w->scratch, j->draw->stamp[i - strips]);
-        if (st)
-            return st;
-        drawn += e->part == 0;
-    }
-    if (j->bar && drawn)
-        progress_tick(j->bar, drawn);
-    return OK;
-}
-
 static size_t doubles_of(const struct plan *p, const struct entry *e)
 {
     const struct piece q = piece_of(p, e);
     return ((size_t)q.rows * q.stride + 7) / 8 * 8;
 }
 
-/* Take as many of n entries as the space holds (at least one). */
-static void batch_fill(const struct plan *p, const struct entry *e, size_t n, struct batch *b)
+/*
+ * Entries in chunks: a thread draws a chunk and adds it to one strip after the other, to each in its turn.  The sums of
+ * a strip are so formed in the order of the entries, whoever forms them.  Nobody waits for a turn who can draw
+ * one more chunk instead.
+ */
+struct job {
+    const struct plan *p;
+    const struct entry *entry;
+    const size_t *first;           /* entry of each chunk, and one more: the end */
+    struct window *w;
+    struct worker *worker;
+    int hold;                      /* chunks that each may hold, 1..HELD */
+    struct progress *bar;
+    struct par_turns *turns;       /* of the chunks in each strip */
+};
+
+static int chunk_draw(const struct job *j, struct worker *w, long chunk)
 {
+    double *stamp = w->stamp[w->held];
+    long drawn = 0;
+    for (const struct entry *e = j->entry + j->first[chunk]; e < j->entry + j->first[chunk + 1]; stamp += doubles_of(j->p, e++)) {
+        int st = draw_piece(j->p, e, w->work, w->scratch, stamp);
+        if (st)
+            return st;
+        drawn += e->part == 0;
+    }
+    w->chunk[w->held++] = chunk;
+    if (j->bar && drawn)
+        progress_tick(j->bar, drawn);
+    return OK;
+}
+
+/* Add the oldest chunk held. */
+static int chunk_add(const struct job *j, struct worker *w)
+{
+    const long chunk = w->chunk[0];
+    double *space = w->stamp[0];
+    for (int strip = 0; strip < STRIPS; strip++) {
+        int st = par_turn_wait(j->turns, strip, chunk);
+        if (st)
+            return st;
+        const double *stamp = space;
+        for (const struct entry *e = j->entry + j->first[chunk]; e < j->entry + j->first[chunk + 1]; stamp += doubles_of(j->p, e++)) {
+            const struct piece q = piece_of(j->p, e);
+            strip_add(j->w, strip, &j->p->draw[e->index], &q, e->row < 0, stamp);
+        }
+        par_turn_end(j->turns, strip);
+    }
+    w->held--;
+    for (int k = 0; k < w->held; k++) {
+        w->chunk[k] = w->chunk[k + 1];
+        w->stamp[k] = w->stamp[k + 1];
+    }
+    w->stamp[w->held] = space;
+    return OK;
+}
+
+static int draw_and_add(void *ctx, long begin, long end, int worker)
+{
+    const struct job *j = ctx;
+    struct worker *w = &j->worker[worker];
+    (void)begin;
+    (void)end;
+    for (;;) {
+        const long chunk = par_turn_take(j->turns);
+        int st = chunk < 0 ? OK : chunk_draw(j, w, chunk);
+        while (st == OK && w->held && (chunk < 0 || w->held == j->hold || par_turn_ready(j->turns, STRIPS - 1, w->chunk[0])))
+            st = chunk_add(j, w);
+        if (st)
+            par_turns_fail(j->turns, st);
+        if (st || chunk < 0)
+            return st;
+    }
+}
+
+/* Cut n entries into chunks of at most CHUNK_PIXELS (or of one entry); first has room for n + 1. Returns their number. */
+static long cut_chunks(const struct plan *p, const struct entry *e, size_t n, size_t *first)
+{
+    long chunks = 0;
     size_t used = 0;
-    b->entry = e;
-    for (b->n = 0; b->n < n && b->n < BATCH_PIXELS / 16; b->n++) {
-        const size_t need = doubles_of(p, &e[b->n]);
-        if (b->n > 0 && used + need > b->size)
-            break;
-        b->stamp[b->n] = b->space + used;
+    for (size_t i = 0; i < n; i++) {
+        const size_t need = doubles_of(p, &e[i]);
+        if (i == 0 || used + need > CHUNK_PIXELS) {
+            first[chunks++] = i;
+            used = 0;
+        }
         used += need;
     }
+    first[chunks] = n;
+    return chunks;
 }
 
 /* Rows of the image come into memory, each by one thread: two that meet in a fresh page wait for the kernel, five times as long. */
@@ -261,41 +294,29 @@ static int touch_rows(void *ctx, long begin, long end, int worker)
     return OK;
 }
 
-/* All batches in turn; with two of them one is added while the other is drawn, so that no thread waits. */
-static int run(struct job *j, size_t n, const struct entry *e, struct batch *b, int batches, struct par_team *team)
-{
-    const struct batch none = {0};
-    int turn = 0, st = OK;
-    j->add = &none;
-    for (size_t begin = 0; begin < n && st == OK; turn = (turn + 1) % batches) {
-        struct batch *next = &b[turn];
-        batch_fill(j->p, e + begin, n - begin, next);
-        begin += next->n;
-        j->draw = next;
-        const long items = (long)next->n + (j->add->n ? STRIPS : 0);
-        st = par_team_for(team, items, 1 + items / SHARES, add_and_draw, j);
-        j->add = next;
-        j->draw = &none;
-        if (st == OK && (batches == 1 || begin == n)) {
-            st = par_team_for(team, STRIPS, 1, add_and_draw, j);
-            j->add = &none;
-        }
-    }
-    for (int strip = 0; st == OK && j->w->row && strip < STRIPS; strip++)
-        window_move(j->w, strip, j->w->im->ny);
-    return st;
-}
-
-static int workers_new(struct worker *w, int threads, size_t scratch)
+static int workers_new(struct worker *w, int threads, size_t scratch, size_t space, int hold)
 {
     int st = OK;
     for (int t = 0; t < threads && st == OK; t++) {
         st = stamp_work_new(&w[t].work);
         w[t].scratch = malloc((3 * scratch + 1) * sizeof *w[t].scratch);
-        if (!w[t].scratch)
+        w[t].space = fft_alloc((size_t)hold * space * sizeof *w[t].space);
+        if (!w[t].scratch || !w[t].space)
             st = E_NOMEM;
+        for (int k = 0; k < hold && w[t].space; k++)
+            w[t].stamp[k] = w[t].space + (size_t)k * space;
     }
     return st;
+}
+
+static void workers_free(struct worker *w, int threads)
+{
+    for (int t = 0; w && t < threads; t++) {
+        stamp_work_free(w[t].work);
+        free(w[t].scratch);
+        fft_free(w[t].space);
+    }
+    free(w);
 }
 
 /* What the entries of one pass need. */
@@ -342,6 +363,19 @@ static size_t entries(const struct plan *p)
     return n;
 }
 
+/* All chunks of one pass on the threads. */
+static int run(struct job *j, long chunks, int threads)
+{
+    j->turns = par_turns_new(STRIPS, chunks);
+    if (!j->turns)
+        return E_NOMEM;
+    int st = threads > 1 ? par_for(j->w->im->ny, 1 + j->w->im->ny / 16, threads, touch_rows, j->w->im) : OK;
+    if (st == OK)
+        st = par_for(threads, 1, threads, draw_and_add, j);
+    par_turns_free(j->turns);
+    return st;
+}
+
 /* One pass has its own memory: that of tall stamps is given back before the window is made. */
 static int render_pass(const struct plan *p, const struct pass *q, const struct entry *e, struct image *im, int threads,
                        struct progress *bar)
@@ -349,37 +383,28 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
     if (q->n == 0)
         return OK;
     struct window w = {.im = im, .height = q->tallest > im->ny ? (int)im->ny : q->tallest};
+    const size_t space = (q->largest > CHUNK_PIXELS ? q->largest : CHUNK_PIXELS) + 8, most = SPACE_PIXELS / space;
+    int hold = most / (size_t)threads > HELD ? HELD : (int)(most / (size_t)threads);
+    if (hold < 1) {                                /* few large stamps at a time */
+        threads = most < 1 ? 1 : (int)most;
+        hold = 1;
+    }
+    size_t *first = malloc((q->n + 1) * sizeof *first);
     struct worker *workers = calloc((size_t)threads, sizeof *workers);
-    size_t size = threads > 1 ? PAIR_PIXELS : BATCH_PIXELS;
-    const int batches = threads > 1 && q->largest <= size / 4 ? 2 : 1;
-    size = q->largest > size ? q->largest : size;
-    double *space = fft_alloc((size + 8) * sizeof *space);
-    double **stamp = malloc(2 * (BATCH_PIXELS / 16) * sizeof *stamp);
     if (q->tallest)
         w.row = malloc((size_t)w.height * (size_t)im->nx * sizeof *w.row);
     if (w.row)
         memset(w.row, 0, (size_t)w.height * (size_t)im->nx * sizeof *w.row);    /* here, not by threads that meet in its pages */
-    int st = workers && stamp && space && (w.row || !q->tallest) ? workers_new(workers, threads, plan_scratch(p)) : E_NOMEM;
+    int st = first && workers && (w.row || !q->tallest) ? workers_new(workers, threads, plan_scratch(p), space, hold) : E_NOMEM;
     if (st == OK) {
-        const size_t half = size / (size_t)batches / 8 * 8;
-        struct batch b[2] = {{.stamp = stamp, .space = space, .size = half},
-                             {.stamp = stamp + BATCH_PIXELS / 16, .space = space + half, .size = half}};
-        struct job job = {.p = p, .w = &w, .worker = workers, .bar = bar};
-        struct par_team *team = par_team_new(threads);
-        if (team)
-            st = par_team_for(team, im->ny, 1 + im->ny / 16, touch_rows, im);
-        if (st == OK)
-            st = run(&job, q->n, e, b, batches, team);
-        par_team_free(team);
+        struct job job = {.p = p, .entry = e, .first = first, .w = &w, .worker = workers, .hold = hold, .bar = bar};
+        st = run(&job, cut_chunks(p, e, q->n, first), threads);
     }
-    for (int t = 0; workers && t < threads; t++) {
-        stamp_work_free(workers[t].work);
-        free(workers[t].scratch);
-    }
-    free(workers);
-    free(stamp);
+    for (int strip = 0; st == OK && w.row && strip < STRIPS; strip++)
+        window_move(&w, strip, im->ny);
+    workers_free(workers, threads);
+    free(first);
     free(w.row);
-    fft_free(space);
     return st;
 }
 

@@ -1,7 +1,7 @@
 /*
  * render.h - sums the stamps of a plan into an image of expected electrons.
  *
- * Stamps are made in parallel in batches and added in one fixed order, in
+ * Stamps are made in parallel, a few at a time, and added in one fixed order, in
  * double precision, to a window of rows that slides up the image: the same bytes
  * for any number of threads.
  */

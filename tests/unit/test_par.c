@@ -1,0 +1,115 @@
+/* test_par.c - loops on threads: every item once, failures end them, and turns are kept whoever works. */
+#include "check.h"
+#include "par.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { N = 1000, PLACES = 3, HELD = 4 };
+
+static int count(void *ctx, long begin, long end, int worker)
+{
+    int *times = ctx;
+    (void)worker;
+    for (long i = begin; i < end; i++)
+        times[i]++;
+    return OK;
+}
+
+static int fail_at(void *ctx, long begin, long end, int worker)
+{
+    const long *bad = ctx;
+    (void)worker;
+    return *bad >= begin && *bad < end ? E_NOCONV : OK;
+}
+
+struct chain {
+    struct par_turns *turns;
+    long order[PLACES][N], n[PLACES];
+    long fail;                     /* item that fails, or -1 */
+    volatile double sink;
+};
+
+/* Takes items, works for a time that differs from one to the next, holds up to HELD, and enters each at every place in its turn. */
+static int chained(void *ctx, long begin, long end, int worker)
+{
+    struct chain *c = ctx;
+    long held[HELD];
+    int n = 0;
+    (void)begin;
+    (void)end;
+    (void)worker;
+    for (;;) {
+        const long item = par_turn_take(c->turns);
+        for (long k = 0; item >= 0 && k < (item * 7919) % 2000; k++)
+            c->sink = (double)k;
+        if (item >= 0 && item == c->fail) {
+            par_turns_fail(c->turns, E_NOCONV);
+            return E_NOCONV;
+        }
+        if (item >= 0)
+            held[n++] = item;
+        while (n && (item < 0 || n == HELD || par_turn_ready(c->turns, PLACES - 1, held[0]))) {
+            for (int place = 0; place < PLACES; place++) {
+                int st = par_turn_wait(c->turns, place, held[0]);
+                if (st)
+                    return st;
+                c->order[place][c->n[place]++] = held[0];
+                par_turn_end(c->turns, place);
+            }
+            memmove(held, held + 1, (size_t)--n * sizeof *held);
+        }
+        if (item < 0)
+            return OK;
+    }
+}
+
+static int in_order(const struct chain *c, long n)
+{
+    int good = 1;
+    for (int place = 0; place < PLACES; place++) {
+        good &= c->n[place] == n;
+        for (long i = 0; i < c->n[place]; i++)
+            good &= c->order[place][i] == i;
+    }
+    return good;
+}
+
+int main(void)
+{
+    static int times[N];
+    for (int threads = 1; threads <= 5; threads += 2) {
+        memset(times, 0, sizeof times);
+        int once = par_for(N, 7, threads, count, times) == OK;
+        for (int i = 0; i < N; i++)
+            once &= times[i] == 1;
+        check_that(once, "%d threads: every item once", threads);
+        long bad = 500;
+        check_that(par_for(N, 7, threads, fail_at, &bad) == E_NOCONV, "%d threads: a failure is told", threads);
+    }
+    check_that(par_for(-1, 1, 1, count, times) == E_RANGE && par_for(1, 0, 1, count, times) == E_RANGE && par_for(1, 1, 0, count, times) == E_RANGE,
+               "sizes that make no sense");
+
+    static struct chain c;
+    for (int threads = 1; threads <= 5; threads += 2) {
+        int good = 1;
+        for (int k = 0; k < 20; k++) {
+            memset(&c, 0, sizeof c);
+            c.fail = -1;
+            c.turns = par_turns_new(PLACES, N);
+            good &= c.turns && par_for(threads, 1, threads, chained, &c) == OK && in_order(&c, N);
+            par_turns_free(c.turns);
+        }
+        check_that(good, "%d threads: 1000 items come to three places in their order, 20 times", threads);
+        good = 1;
+        for (int k = 0; k < 20; k++) {
+            memset(&c, 0, sizeof c);
+            c.fail = 300 + 7 * k;
+            c.turns = par_turns_new(PLACES, N);
+            good &= c.turns && par_for(threads, 1, threads, chained, &c) == E_NOCONV && c.n[0] <= c.fail;
+            par_turns_free(c.turns);
+        }
+        check_that(good, "%d threads: an item that fails ends the others, and none passes it, 20 times", threads);
+    }
+    check_that(par_turns_new(0, 5) == NULL, "no places, no turns");
+    return check_status();
+}
