@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 struct params {
-    const char *stars, *psf, *weight, *segmentation, *region;
+    const char *stars, *psf, *weight, *segmentation, *region, *plain;
     char *star_image;         /* of --stars IMAGE,CATALOGUE, or NULL */
     const char *star_cat;
     double width, fixed, min, max, cut, scale, pixel;
@@ -306,14 +306,14 @@ static void split_stars(struct params *p)
         die(EXIT_RUN, "%s: %s", p->stars, err_text(E_NOMEM));
 }
 
-static void write_catalogue(const struct table *t, const struct program *prog, const struct opt *own,
-                            const struct params *p, const struct common *c)
+static void write_catalogue(const struct table *t, const char *out, const struct program *prog,
+                            const struct opt *own, const struct params *p, const struct common *c)
 {
     struct err e;
     const char *inputs[INPUTS];
     const size_t n = inputs_of(p, c, inputs);
     char *record = opt_record(prog, own, c);
-    if (table_write(t, c->out, record, inputs, n, &e))
+    if (table_write(t, out, record, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     free(record);
 }
@@ -343,8 +343,16 @@ static void write_region(const struct table *t, const struct params *p, const st
         die(EXIT_RUN, "%s", e.text);
 }
 
-/* Shapes of the galaxies; the catalogue of `in` gets the columns. */
-static void measure_objects(struct input *in, const struct params *p, const struct common *c)
+/* What the columns need beside themselves: keywords of the image and the PSF. */
+static void set_keywords(struct table *t, const struct input *in, const struct starmom *psf, double own)
+{
+    check(catkeys_copy(t, &in->hdr), "keywords");
+    if (psf)
+        set_psf(t, psf, own, in->scale);
+}
+
+/* Shapes of the galaxies; the catalogue of `in` gets the columns, and *plain those of --plain. */
+static void measure_objects(struct input *in, const struct params *p, const struct common *c, struct table *plain)
 {
     struct err e;
     struct moments_object *objects;
@@ -363,9 +371,13 @@ static void measure_objects(struct input *in, const struct params *p, const stru
         free(objects);
         return;
     }
-    if (c->max_memory > 0 && shapecat_bytes(in->cat.nrow) > c->max_memory)
-        die(EXIT_RUN, "%s: the shapes of %zu objects need %.0f bytes: raise --max-memory", c->argv[1], in->cat.nrow,
-            shapecat_bytes(in->cat.nrow));
+    double bytes = shapecat_bytes(in->cat.nrow) * (p->plain ? 2 : 1) + (p->plain ? (double)(in->cat.nrow * sizeof *o.raw) : 0);
+    if (c->max_memory > 0 && bytes > c->max_memory)
+        die(EXIT_RUN, "%s: the shapes of %zu objects need %.0f bytes: raise --max-memory", c->argv[1], in->cat.nrow, bytes);
+    if (p->plain) {
+        o.raw = malloc((in->cat.nrow + 1) * sizeof *o.raw);
+        check(o.raw ? table_copy(plain, &in->cat) : E_NOMEM, c->argv[1]);
+    }
     struct progress bar;
     progress_begin(&bar, "shapes", (long)in->cat.nrow, c->quiet);
     int st = shapecat_measure(&in->cat, &in->map, objects, psf, &o, &bar, &bad);
@@ -373,13 +385,17 @@ static void measure_objects(struct input *in, const struct params *p, const stru
     if (st == E_DATA)
         die(EXIT_RUN, "%s: a column with the name of a shape column is of another type", c->argv[1]);
     check(st, c->argv[1]);
-    check(catkeys_copy(&in->cat, &in->hdr), "keywords");
-    if (psf)
-        set_psf(&in->cat, psf, own, in->scale);
+    set_keywords(&in->cat, in, psf, own);
+    if (p->plain) {
+        o.rrg.plain = o.rrg.first = 1;
+        check(shapecat_correct(plain, objects, psf, &o), c->argv[1]);
+        set_keywords(plain, in, psf, own);
+    }
     if (p->region)
         write_region(&in->cat, p, c);
     if (c->verbose)
         warn("%s: %zu objects, %ld with flags", c->argv[1], in->cat.nrow, bad);
+    free(o.raw);
     free(objects);
 }
 
@@ -426,6 +442,7 @@ int main(int argc, char **argv)
         {"weight-cut", 0, OPT_REAL, &p.cut, 0.5, 100, "K", "radius where the weight ends, in widths", NULL, 0},
         {"fourth", 0, OPT_CHOICE, &p.fourth, 0, 0, "HOW", "PSF correction of the fourth moments", "exact|plain", 0},
         {"psf-correction", 0, OPT_CHOICE, &p.correction, 0, 0, "HOW", "PSF freed of its weight; first: width 0.18 arcsec", "resummed|first", 0},
+        {"plain", 0, OPT_STR, &p.plain, 0, 0, "FILE", "second catalogue, as --fourth plain --psf-correction first give it", NULL, 1},
         {"centroid-term", 0, OPT_FLAG, &p.centroid, 0, 0, NULL, "add the motion of the centroid to P11, P22", NULL, 0},
         {"no-recenter", 0, OPT_FLAG, &p.no_recenter, 0, 0, NULL, "measure about X_IMAGE, Y_IMAGE", NULL, 0},
         {"no-background", 0, OPT_FLAG, &p.no_background, 0, 0, NULL, "do not subtract the column BACKGROUND", NULL, 0},
@@ -445,17 +462,22 @@ int main(int argc, char **argv)
 
     if (p.region && (p.stars_only || outfile_same(p.region, c.out)))
         die(EXIT_USAGE, "--region %s: not with --stars-only, and not the output", p.region);
+    if (p.plain && (p.stars_only || outfile_same(p.plain, c.out) || (p.region && outfile_same(p.plain, p.region))))
+        die(EXIT_USAGE, "--plain %s: not with --stars-only, and not another output", p.plain);
     split_stars(&p);
     struct input in;
-    struct table curve = {0};
+    struct table curve = {0}, plain = {0};
     read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);
     if (p.stars_only)
         measure_curve(&in, &p, &c, &curve);
     else
-        measure_objects(&in, &p, &c);
+        measure_objects(&in, &p, &c, &plain);
+    if (!c.check && p.plain)
+        write_catalogue(&plain, p.plain, &prog, own, &p, &c);
     if (!c.check)
-        write_catalogue(p.stars_only ? &curve : &in.cat, &prog, own, &p, &c);
+        write_catalogue(p.stars_only ? &curve : &in.cat, c.out, &prog, own, &p, &c);
     table_free(&curve);
+    table_free(&plain);
     free_input(&in);
     free(p.star_image);
     return EXIT_DONE;

@@ -20,7 +20,8 @@ struct stamp {
     double *pix, *var;
     double *a[5];             /* column sums, nx each */
     double *state;            /* GOOD .. MIRRORED, nx*ny; doubles keep one block of scratch */
-    int neighbours;           /* there are pixels of other labels */
+    double *other;            /* pixels of other labels, `neighbours` of them */
+    size_t neighbours;
     int bad;                  /* there are blank pixels */
     long mx, my;              /* 2 x centre, rounded: mirror the masked pixels were filled with */
 };
@@ -67,7 +68,7 @@ static long clip(double v, long lo, long hi)
 /* Reserve and address the arrays of a window; its sides are set. */
 static int stamp_reserve(struct stamp *st, struct moments_scratch *sc)
 {
-    size_t nx = (size_t)st->nx, n = nx * (size_t)st->ny, need = 3 * n + 5 * nx;
+    size_t nx = (size_t)st->nx, n = nx * (size_t)st->ny, need = 4 * n + 5 * nx;
     if (need > sc->cap) {
         double *mem = realloc(sc->mem, (need + need / 2) * sizeof *mem);
         if (!mem)
@@ -78,8 +79,9 @@ static int stamp_reserve(struct stamp *st, struct moments_scratch *sc)
     st->pix = sc->mem;
     st->var = st->pix + n;
     st->state = st->var + n;
+    st->other = st->state + n;
     for (int k = 0; k < 5; k++)
-        st->a[k] = st->state + n + (size_t)k * nx;
+        st->a[k] = st->other + n + (size_t)k * nx;
     return OK;
 }
 
@@ -94,7 +96,8 @@ static int stamp_cut(struct stamp *st, const struct moments_map *m, const struct
     st->ny = clip(ceil(cy + reach), 0, m->ny - 1) - st->y0 + 1;
     if (stamp_reserve(st, sc))
         return E_NOMEM;
-    st->neighbours = st->bad = 0;
+    st->neighbours = 0;
+    st->bad = 0;
     st->mx = st->my = -1;
 
     size_t own = (size_t)clip(floor(o->y + 0.5), 0, m->ny - 1) * (size_t)m->nx +
@@ -112,7 +115,7 @@ static int stamp_cut(struct stamp *st, const struct moments_map *m, const struct
         for (long i = 0; m->label && i < st->nx; i++)
             if (m->label[row + (size_t)i] > 0 && (double)m->label[row + (size_t)i] != o->label) {
                 st->state[k + (size_t)i] = NEIGHBOUR;
-                st->neighbours = 1;
+                st->other[st->neighbours++] = (double)(k + (size_t)i);
             }
         for (long i = 0; i < st->nx; i++)
             if (st->state[k + (size_t)i] != GOOD) {
@@ -131,19 +134,17 @@ static void stamp_mirror(struct stamp *st, double cx, double cy)
         return;
     st->mx = mx;
     st->my = my;
-    for (long j = 0; j < st->ny; j++)
-        for (long i = 0; i < st->nx; i++) {
-            size_t k = (size_t)j * (size_t)st->nx + (size_t)i;
-            if (st->state[k] < NEIGHBOUR)
-                continue;
-            long u = mx - st->x0 - i - st->x0, v = my - st->y0 - j - st->y0;
-            int in = u >= 0 && u < st->nx && v >= 0 && v < st->ny;
-            size_t from = in ? (size_t)v * (size_t)st->nx + (size_t)u : k;
-            int free_there = in && st->state[from] == GOOD;
-            st->state[k] = free_there ? MIRRORED : NEIGHBOUR;
-            st->pix[k] = free_there ? st->pix[from] : 0;
-            st->var[k] = free_there ? st->var[from] : 0;
-        }
+    for (size_t n = 0; n < st->neighbours; n++) {
+        size_t k = (size_t)st->other[n];
+        long i = (long)k % st->nx, j = (long)k / st->nx;
+        long u = mx - st->x0 - i - st->x0, v = my - st->y0 - j - st->y0;
+        int in = u >= 0 && u < st->nx && v >= 0 && v < st->ny;
+        size_t from = in ? (size_t)v * (size_t)st->nx + (size_t)u : k;
+        int free_there = in && st->state[from] == GOOD;
+        st->state[k] = free_there ? MIRRORED : NEIGHBOUR;
+        st->pix[k] = free_there ? st->pix[from] : 0;
+        st->var[k] = free_there ? st->var[from] : 0;
+    }
 }
 
 /* Columns i0..i1-1 of row j (absolute) whose pixels are nearer than r to (cx, cy). */
@@ -362,32 +363,28 @@ static void set_empty(struct moments *out)
         out->m2[k] = NAN;
 }
 
-int moments_measure(const struct moments_map *map, const struct moments_object *obj,
-                    const struct moments_options *opt, struct moments_scratch *scratch, struct moments *out)
+/* Moments of one width in a window that was cut for it or for more, or that is still empty. */
+static int measure(struct stamp *st, const struct moments_map *map, const struct moments_object *obj,
+                   const struct moments_options *opt, struct moments_scratch *scratch, struct moments *out)
 {
-    struct stamp st;
     struct moments m = {.x = obj->x, .y = obj->y, .w = obj->w};
-    if (!(obj->w > 0) || !isfinite(obj->w) || !(opt->cut > 0) || !isfinite(obj->x) || !isfinite(obj->y) ||
-        map->nx < 1 || map->ny < 1 || !isfinite(opt->cut * obj->w))
-        return E_RANGE;
-
     double r = opt->cut * obj->w;
     int inside = obj->x > -0.5 && obj->y > -0.5 && obj->x < (double)map->nx - 0.5 && obj->y < (double)map->ny - 0.5;
-    if (stamp_cut(&st, map, obj, m.x, m.y, r, scratch))
+    if (!stamp_holds(st, map, m.x, m.y, r) && stamp_cut(st, map, obj, m.x, m.y, r, scratch))
         return E_NOMEM;
-    stamp_mirror(&st, m.x, m.y);
-    if (inside && !opt->fixed_centre && centre(&st, map, obj, opt, r, scratch, &m))
+    stamp_mirror(st, m.x, m.y);
+    if (inside && !opt->fixed_centre && centre(st, map, obj, opt, r, scratch, &m))
         return E_NOMEM;
-    if (!stamp_holds(&st, map, m.x, m.y, r)) {
-        if (stamp_cut(&st, map, obj, m.x, m.y, r, scratch))
+    if (!stamp_holds(st, map, m.x, m.y, r)) {
+        if (stamp_cut(st, map, obj, m.x, m.y, r, scratch))
             return E_NOMEM;
-        stamp_mirror(&st, m.x, m.y);
+        stamp_mirror(st, m.x, m.y);
     }
     if (at_edge(map, m.x, m.y, r))
         m.flags |= SHAPE_EDGE;
-    if (st.bad || st.neighbours) {
+    if (st->bad || st->neighbours) {
         double of[2];
-        if (disc_masked(&st, m.x, m.y, m.w, r, of))
+        if (disc_masked(st, m.x, m.y, m.w, r, of))
             m.flags |= SHAPE_BADPIX;
         if (of[0] + of[1] > 0.10 || of[1] > 0.01)
             m.flags |= SHAPE_CROWDED;
@@ -395,7 +392,7 @@ int moments_measure(const struct moments_map *map, const struct moments_object *
     }
 
     double sum[25];
-    disc_sums(&st, st.pix, m.x, m.y, m.w, r, 4, sum);
+    disc_sums(st, st->pix, m.x, m.y, m.w, r, 4, sum);
     if (!inside || (m.flags & SHAPE_NOFLUX) || !(sum[0] > 0)) {
         m.flags |= SHAPE_NOFLUX;
         set_empty(&m);
@@ -403,12 +400,40 @@ int moments_measure(const struct moments_map *map, const struct moments_object *
         return OK;
     }
     set_moments(sum, &m);
-    disc_sums(&st, st.var, m.x, m.y, m.w * M_SQRT1_2, r, 4, sum);
-    for (int k = 0; k < 25 && map->noise_cor > 0; k++)
-        sum[k] *= map->noise_cor * map->noise_cor;
-    set_errors(sum, &m);
+    if (!opt->no_errors) {
+        disc_sums(st, st->var, m.x, m.y, m.w * M_SQRT1_2, r, 4, sum);
+        for (int k = 0; k < 25 && map->noise_cor > 0; k++)
+            sum[k] *= map->noise_cor * map->noise_cor;
+        set_errors(sum, &m);
+    }
     if (!(smallest(m.m2, m.w) >= SHAPE_SINGULAR_LIMIT))
         m.flags |= SHAPE_NEARSINGULAR;
     *out = m;
     return OK;
+}
+
+static int measurable(const struct moments_map *map, const struct moments_object *o, const struct moments_options *opt)
+{
+    return o->w > 0 && isfinite(o->w) && opt->cut > 0 && isfinite(o->x) && isfinite(o->y) && map->nx > 0 &&
+           map->ny > 0 && isfinite(opt->cut * o->w);
+}
+
+int moments_measure(const struct moments_map *map, const struct moments_object *obj,
+                    const struct moments_options *opt, struct moments_scratch *scratch, struct moments *out)
+{
+    struct stamp st = {0};
+    return measurable(map, obj, opt) ? measure(&st, map, obj, opt, scratch, out) : E_RANGE;
+}
+
+int moments_series(const struct moments_map *map, const struct moments_object *obj, int n, const double *w,
+                   const struct moments_options *opt, struct moments_scratch *scratch, struct moments *out)
+{
+    struct stamp st = {0};
+    struct moments_object o = *obj;
+    int bad = OK;
+    for (int k = n - 1; k >= 0 && bad == OK; k--) {       /* the widest window serves the others */
+        o.w = w[k];
+        bad = measurable(map, &o, opt) ? measure(&st, map, &o, opt, scratch, &out[k]) : E_RANGE;
+    }
+    return bad;
 }

@@ -55,6 +55,7 @@ struct moments_options {
     double tol;               /* the centroid has settled when a step is shorter, px */
     int max_steps;
     int fixed_centre;         /* measure about the given position */
+    int no_errors;            /* s_var and cov stay 0 */
 };
 
 #define MOMENTS_DEFAULTS {.cut = 4, .tol = 1e-6, .max_steps = 60}
@@ -94,5 +95,10 @@ void moments_scratch_free(struct moments_scratch *s);
 MUST_CHECK int moments_measure(const struct moments_map *map, const struct moments_object *obj,
                                const struct moments_options *opt, struct moments_scratch *scratch,
                                struct moments *out);
+
+/* The same at n rising widths w (obj->w is ignored) for less: one window of pixels serves all. */
+MUST_CHECK int moments_series(const struct moments_map *map, const struct moments_object *obj, int n, const double *w,
+                              const struct moments_options *opt, struct moments_scratch *scratch,
+                              struct moments *out);
 
 #endif

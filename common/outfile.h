@@ -3,7 +3,7 @@
  *
  * A named regular file is written under a temporary name in the same folder
  * (without a name at all where the system has O_TMPFILE), its size checked,
- * synced and renamed.  Standard output and devices get their bytes only at
+ * synced (not with PIXSHEAR_SYNC=0 in the environment) and renamed.  Standard output and devices get their bytes only at
  * commit, from a spool; a reader that went away or a full device is an error.
  */
 #ifndef PIXSHEAR_OUTFILE_H

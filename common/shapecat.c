@@ -164,7 +164,7 @@ int shapecat_stars(const struct table *t, const struct shapecat_options *opt, do
 }
 
 struct job {
-    const struct moments_map *map;
+    const struct moments_map *map;            /* NULL: the moments are in opt->raw */
     const struct moments_object *objects;
     const struct starmom *psf;
     const struct shapecat_options *opt;
@@ -203,6 +203,22 @@ static void correct(const struct job *job, const struct moments *m, const struct
     rrg_psf_error(m, psf, &job->opt->rrg, first ? job->first_cov : here, r, stars);
 }
 
+/* Moments of row i: measured, or from what an earlier measurement kept. */
+static int row_moments(const struct job *job, long i, int worker, struct moments *m)
+{
+    struct moments *raw = job->opt->raw ? &job->opt->raw[i] : m;
+    int st = OK;
+    if (job->map)
+        st = moments_measure(job->map, &job->objects[i], &job->opt->moments, &job->scratch[worker], raw);
+    if (st == E_RANGE)
+        *raw = unmeasured(&job->objects[i]);
+    else if (st)
+        return st;
+    if (raw != m)
+        *m = *raw;
+    return OK;
+}
+
 static int measure_rows(void *ctx, long begin, long end, int worker)
 {
     struct job *job = ctx;
@@ -212,10 +228,8 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
         struct rrg_psf psf = {.w = o->w};
         struct rrg r;
         double v[FIELDS];
-        int st = moments_measure(job->map, o, &job->opt->moments, &job->scratch[worker], &m);
-        if (st == E_RANGE)
-            m = unmeasured(o);
-        else if (st)
+        int st = row_moments(job, i, worker, &m);
+        if (st)
             return st;
         if (job->psf)
             starmom_at(job->psf, o->w, &psf);
@@ -246,8 +260,8 @@ double shapecat_bytes(size_t rows)
     return 8.0 * (FIELDS + 1) * (double)rows;
 }
 
-int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
-                     const struct starmom *psf, const struct shapecat_options *opt, struct progress *bar, long *bad)
+static int fill_columns(struct table *t, const struct moments_map *map, const struct moments_object *objects,
+                        const struct starmom *psf, const struct shapecat_options *opt, struct progress *bar, long *bad)
 {
     struct job job = {.map = map, .objects = objects, .psf = psf, .opt = opt, .bar = bar};
     int st = OK;
@@ -275,6 +289,19 @@ int shapecat_measure(struct table *t, const struct moments_map *map, const struc
     for (size_t i = 0; i < t->nrow && st == OK; i++)
         *bad += job.flags[i] != 0;
     return st;
+}
+
+int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
+                     const struct starmom *psf, const struct shapecat_options *opt, struct progress *bar, long *bad)
+{
+    return fill_columns(t, map, objects, psf, opt, bar, bad);
+}
+
+int shapecat_correct(struct table *t, const struct moments_object *objects, const struct starmom *psf,
+                     const struct shapecat_options *opt)
+{
+    long bad;
+    return opt->raw ? fill_columns(t, NULL, objects, psf, opt, NULL, &bad) : E_RANGE;
 }
 
 /* Column names: PXXERR, and PXX_PXY for the covariance of two moments. */

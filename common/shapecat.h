@@ -21,6 +21,7 @@ struct shapecat_options {
     double first_width;       /* with rrg.first: width of the PSF's weight, px */
     struct moments_options moments;
     struct rrg_options rrg;
+    struct moments *raw;      /* NULL, or room for the moments of every row: kept for shapecat_correct() */
     int threads;
 };
 
@@ -49,6 +50,10 @@ MUST_CHECK int shapecat_stars(const struct table *t, const struct shapecat_optio
 MUST_CHECK int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
                                 const struct starmom *psf, const struct shapecat_options *opt,
                                 struct progress *bar, long *bad);
+
+/* The shape columns of another correction, from the moments that shapecat_measure() kept in opt->raw. */
+MUST_CHECK int shapecat_correct(struct table *t, const struct moments_object *objects, const struct starmom *psf,
+                                const struct shapecat_options *opt);
 
 /* Bytes that the shape columns of so many rows take. */
 double shapecat_bytes(size_t rows);

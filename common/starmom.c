@@ -21,38 +21,55 @@ int starmom_widths(struct starmom *s, int n, double lo, double hi)
     return OK;
 }
 
-/* All stars at all widths: value[(width * N + quantity) * n + star], NaN where flagged. */
+/* Stars at all widths: value[(width * N + quantity) * n + star], NaN where flagged. */
 struct job {
     const struct starmom *s;
     const struct moments_map *map;
     const struct moments_object *stars;
     const struct moments_options *opt;
     size_t n;
+    const unsigned char *keep;
     double *value;
     double *d;                /* d at dstar_w */
     struct moments_scratch *scratch;
 };
 
-static int measure_stars(void *ctx, long begin, long end, int worker)
+static int good(const struct moments *m)
+{
+    return (m->flags & ~SHAPE_NEARSINGULAR) == 0;
+}
+
+static int measure_sizes(void *ctx, long begin, long end, int worker)
 {
     struct job *job = ctx;
     for (long i = begin; i < end; i++) {
         struct moments_object o = job->stars[i];
-        for (int k = -1; k < job->s->n; k++) {
-            struct moments m;
-            o.w = k < 0 ? job->s->dstar_w : job->s->w[k];
-            int st = moments_measure(job->map, &o, job->opt, &job->scratch[worker], &m);
-            if (st)
-                return st;
-            int good = (m.flags & ~SHAPE_NEARSINGULAR) == 0;
-            if (k < 0) {
-                job->d[i] = good && m.s * m.s >= LEAST_SNR * LEAST_SNR * m.s_var ? sqrt(0.5 * (m.m2[0] + m.m2[2])) : NAN;
-                continue;
-            }
+        struct moments m;
+        o.w = job->s->dstar_w;
+        int st = moments_measure(job->map, &o, job->opt, &job->scratch[worker], &m);
+        if (st)
+            return st;
+        job->d[i] = good(&m) && m.s * m.s >= LEAST_SNR * LEAST_SNR * m.s_var ? sqrt(0.5 * (m.m2[0] + m.m2[2])) : NAN;
+    }
+    return OK;
+}
+
+static int measure_widths(void *ctx, long begin, long end, int worker)
+{
+    struct job *job = ctx;
+    struct moments m[STARMOM_MAX];
+    struct moments_options opt = *job->opt;
+    opt.no_errors = 1;
+    for (long i = begin; i < end; i++) {
+        if (!job->keep[i])
+            continue;
+        int st = moments_series(job->map, &job->stars[i], job->s->n, job->s->w, &opt, &job->scratch[worker], m);
+        if (st)
+            return st;
+        for (int k = 0; k < job->s->n; k++)
             for (int q = 0; q < STARMOM_N; q++)
                 job->value[((size_t)k * STARMOM_N + (size_t)q) * job->n + (size_t)i] =
-                    !good ? NAN : q < 3 ? m.m2[q] : m.m4[q - 3];
-        }
+                    !good(&m[k]) ? NAN : q < 3 ? m[k].m2[q] : m[k].m4[q - 3];
     }
     return OK;
 }
@@ -159,16 +176,18 @@ int starmom_measure(struct starmom *s, const struct moments_map *map, size_t n,
 {
     if (s->n < 4 || !(s->dstar_w > 0) || threads < 1 || threads > 256)
         return E_RANGE;
-    struct job job = {.s = s, .map = map, .stars = stars, .opt = opt, .n = n};
+    unsigned char *keep = malloc(n + 1);
+    struct job job = {.s = s, .map = map, .stars = stars, .opt = opt, .n = n, .keep = keep};
     job.value = malloc((n + 1) * (size_t)s->n * STARMOM_N * sizeof(double));
     job.d = malloc((n + 1) * sizeof(double));
     job.scratch = calloc((size_t)threads, sizeof *job.scratch);
-    unsigned char *keep = malloc(n + 1);
     int st = job.value && job.d && job.scratch && keep ? OK : E_NOMEM;
     if (st == OK)
-        st = par_for((long)n, 8, threads, measure_stars, &job);
+        st = par_for((long)n, 8, threads, measure_sizes, &job);
     if (st == OK)
         st = choose(s, job.d, n, max_stars, keep);
+    if (st == OK)
+        st = par_for((long)n, 8, threads, measure_widths, &job);
     if (st == OK)
         st = average(s, job.value, n, keep, use_median);
     if (st == OK)

@@ -45,6 +45,13 @@ sweep() { # NAME COMMAND...: the command writes to "out"
     else pass "$name: $runs faults survived"; fi
     rm -f out$ext ref$ext
 }
+# asked not to wait for the disk, nothing does; the bytes are the same
+synced() { FAULT_KIND=fsync FAULT_AT=0 FAULT_COUNT=count LD_PRELOAD=$so "$@" addnoise --depth 27.7 true.fits -o "out$#"; cat count; }
+near "an output and its folder are synced" "$(synced env)" 2 0
+near "PIXSHEAR_SYNC=0: nothing is" "$(synced env PIXSHEAR_SYNC=0)" 0 0
+near "any other value: as ever" "$(synced env PIXSHEAR_SYNC=no)" 2 0
+same "and the bytes are the same" out1 out2
+rm -f out1 out2 count
 ext=
 sweep psfgen psfgen --pupil-grid 64 --size 32
 sweep galgen galgen --field 12 -n 30 --stars
@@ -57,6 +64,7 @@ sweep drizzle drizzle dith.fits -x 0.1 --pixfrac 0.5
 sweep "drizzle by lists" drizzle @list.txt --shift shifts.txt --var @list.txt --mask @list.txt -x 0.07
 sweep detect detect noisy.fits
 sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
+sweep "rrgshape with two outputs" rrgshape noisy.fits cat.txt --stars stars.rrg --plain /dev/null
 sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
 sweep fom fom cut.txt
 ext=.png

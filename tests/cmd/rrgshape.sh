@@ -98,6 +98,21 @@ printf '1 1e300 30 1e300 1e300\n2 20 30 2.5 2.5\n' | rows >far.cat
 ok "--region of a position beyond everything" rrgshape im.fits far.cat --psf none --region far.reg -o far.out
 if LC_ALL=C grep -vqxE '#.*|global.*|image|ellipse\([-0-9.,]*\) # (color=red )?text=\{[0-9]+\}' far.reg; then fail "the region file has other lines: $(head -c 400 far.reg)"; else pass "ellipses and nothing else"; fi
 near "one ellipse for the other" "$(grep -c '^ellipse' far.reg)" 1 0
+psfgen --size 64 -o p.fits
+ok "--plain" rrgshape im.fits im.cat --psf p.fits --plain plain.out -o exact.out
+rrgshape im.fits im.cat --psf p.fits -o exact.one; rrgshape im.fits im.cat --psf p.fits --fourth plain --psf-correction first -o plain.one
+for f in exact plain; do
+    for w in out one; do grep -v '^# HISTORY' $f.$w >$f.$w.rows; done
+    same "--plain: the $f catalogue is that of a run of its own" $f.out.rows $f.one.rows
+done
+ok "and they differ" test "$(col exact.out E1 | head -1)" != "$(col plain.out E1 | head -1)"
+fails "--plain is the output" 2 rrgshape im.fits im.cat --psf none --plain reg.out -o reg.out
+fails "--plain is --region" 2 rrgshape im.fits im.cat --psf none --plain reg --region reg -o reg.out
+fails "--plain is an input" 1 rrgshape im.fits im.cat --psf none --plain im.cat -o reg.out
+fails "--plain with --stars-only" 2 rrgshape im.fits im.cat --stars-only --plain a.out -o reg.out
+awk 'BEGIN { for (i = 1; i <= 5000; i++) print i, 20, 30, 2.5, 2.5 }' | rows >many.cat
+ok "memory for one catalogue: 2.1 MB" rrgshape im.fits many.cat --psf none --max-memory 3M -o reg.out
+fails "and not for two" 1 rrgshape im.fits many.cat --psf none --plain plain.out --max-memory 3M -o reg.out
 rrgshape - im.cat --psf none <im.fits >pipe.out
 near "image from a pipe" "$(paste <(col im.out JXX_RAW) <(col pipe.out JXX_RAW) | awk '$1 != $2' | wc -l)" 0 0
 rrgshape im.fits im.out --psf none -o again.out
