@@ -141,8 +141,9 @@ static int describe(const struct work *w, struct plan *p, const char *record)
         st = header_set_double(h, "MAGZERO", magzero + 2.5 * log10(r->qe / r->gain), "AB magnitude of 1 BUNIT");
     if (st == OK && r->read_noise > 0)
         st = header_set_double(h, "RDNOISE", r->read_noise, "read noise, electron rms per pixel");
-    if (st == OK && isfinite(r->saturate))
-        st = header_set_double(h, "SATURATE", (r->saturate - p->noise.subtract) / r->gain, "saturation level, BUNIT");
+    const double full = isfinite(r->saturate) ? r->saturate : header_double_or(h, "SATURATE", INFINITY);
+    if (st == OK && isfinite(full))
+        st = header_set_double(h, "SATURATE", (full - p->noise.subtract) / r->gain, "saturation level, BUNIT");
     if (st == OK && (p->level > 0 || r->subtract)) {
         st = header_set_double(h, "SKYLEVEL", p->level / r->gain, "mean sky and dark per pixel, BUNIT");
         if (st == OK)
@@ -227,6 +228,17 @@ static void check_options(const struct request *r)
         die(EXIT_USAGE, "--depth-definition point5 and point10 need --psf FILE");
 }
 
+/* Exposures of one file need numbers of their own, else they would get the same noise. */
+static void check_numbers(const struct plan *p, size_t n)
+{
+    for (size_t i = 1; i < n; i++)
+        for (size_t k = 0; k < i; k++)
+            if (p[i].x.expnum == p[k].x.expnum)
+                die(EXIT_RUN, p[i].x.expnum < 0 ? "%s: no EXPNUM, nor has %s one: number them, or both get the same noise"
+                                                : "%s: has the EXPNUM of %s: number them, or both get the same noise",
+                    p[i].label, p[k].label);
+}
+
 /* All headers and models are made first, so that nothing is drawn for a bad one. */
 static void run(struct work *w, const char *record)
 {
@@ -247,6 +259,7 @@ static void run(struct work *w, const char *record)
         if (st)
             die(EXIT_RUN, "%s: %s", p[i].label, err_text(st));
     }
+    check_numbers(p, n);
     if (!w->c->check && write_all(w, p, n, &e))
         die(EXIT_RUN, "%s", e.text);
     for (size_t i = 0; i < n; i++)

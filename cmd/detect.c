@@ -416,6 +416,22 @@ static void describe(const struct frame *f, const char *in, const struct detect_
             f->zeropoint, mb + 8, 1.2e-8 * (double)image_count(&f->im));
 }
 
+/* Every output can be opened: told before the work, and before one of them appears. */
+static void outputs_ready(const struct options *o, const struct common *c, const char *const *inputs, size_t n)
+{
+    struct err e;
+    const char *file;
+    int st = outfile_ready(c->out, inputs, n, &e);
+    if (st == OK && o->region)
+        st = outfile_ready(o->region, inputs, n, &e);
+    for (size_t i = 0; i < o->checks.n && st == OK; i++) {
+        check_of(o->checks.v[i], &file);
+        st = outfile_ready(file, inputs, n, &e);
+    }
+    if (st)
+        die(EXIT_RUN, "%s", e.text);
+}
+
 /* Detect and write everything that was asked for. */
 static void search(const struct frame *f, const struct program *prog, const struct opt *own, const struct options *o,
                    const struct common *c, const struct detect_params *p, const char *const *inputs, size_t n_inputs)
@@ -425,6 +441,7 @@ static void search(const struct frame *f, const struct program *prog, const stru
     struct progress bar;
     struct detect_params with_bar = *p;
     with_bar.progress = &bar;
+    outputs_ready(o, c, inputs, n_inputs);
     progress_begin(&bar, "detect", DETECT_STEPS, c->quiet);
     detect_or_die(f, in, o, &with_bar, &d);
     progress_end(&bar);

@@ -3,11 +3,13 @@
  */
 #include "err.h"
 #include "opt.h"
+#include "outfile.h"
 #include "stack.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static void plan(const struct stack *s)
 {
@@ -27,9 +29,15 @@ static void plan(const struct stack *s)
             header_double_or(&s->hdr, "NOISECOR", 1));
 }
 
-static void expand(struct names *to, size_t n, const char *const *from)
+/* Lists become the names in them; a list is an input, too. */
+static void expand(struct names *to, size_t n, const char *const *from, const struct common *c)
 {
     struct err e;
+    for (size_t i = 0; i < n; i++) {
+        const char *list = from[i] + 1;
+        if (from[i][0] == '@' && access(from[i], F_OK) && !c->check && outfile_ready(c->out, &list, 1, &e))
+            die(EXIT_RUN, "%s", e.text);
+    }
     if (names_expand(to, n, from, &e))
         die(EXIT_RUN, "%s", e.text);
 }
@@ -37,9 +45,9 @@ static void expand(struct names *to, size_t n, const char *const *from)
 /* Lists of names become names. */
 static void expand_lists(struct stack_choice *q, const struct common *c, const struct opt_strs maps[STACK_MAPS])
 {
-    expand(&q->files, (size_t)c->argc, c->argv);
+    expand(&q->files, (size_t)c->argc, c->argv, c);
     for (int kind = 0; kind < STACK_MAPS; kind++) {
-        expand(&q->maps[kind], maps[kind].n, maps[kind].v);
+        expand(&q->maps[kind], maps[kind].n, maps[kind].v, c);
         if (q->maps[kind].n && q->maps[kind].n != q->files.n)
             die(EXIT_USAGE, "--%s was given %zu times for %zu operands", stack_map_name[kind], q->maps[kind].n, q->files.n);
     }

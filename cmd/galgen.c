@@ -391,6 +391,15 @@ static void turn_field(struct table *t, int quarters)
 
 /* ---- main ---- */
 
+/* Both outputs can be opened. */
+static void check_outputs(const struct params *p, const struct common *c)
+{
+    struct err e;
+    if (outfile_ready(c->out, &p->library, p->library != NULL, &e)
+        || (p->models && outfile_ready(p->models, &p->library, p->library != NULL, &e)))
+        die(EXIT_RUN, "%s", e.text);
+}
+
 static void write_table(const struct table *t, const char *name, const char *record, const struct params *p)
 {
     struct err e;
@@ -438,6 +447,7 @@ int main(int argc, char **argv)
         table_free(&models);
         return EXIT_DONE;
     }
+    check_outputs(&p, &c);
     char *record = opt_record(&prog, own, &c);
     if (p.stars)
         make_stars(&scene, &p, &c);

@@ -329,7 +329,7 @@ static void write_region(const struct table *t, const struct params *p, const st
     const double *xx = table_reals(t, "JXX_RAW"), *xy = table_reals(t, "JXY_RAW"), *yy = table_reals(t, "JYY_RAW");
     const int64_t *flags = table_ints(t, "FLAGS_RRG");
     const struct column *number = table_find(t, "NUMBER");
-    if (region_open(&r, p->region, inputs, n, &e))
+    if (outfile_ready(c->out, inputs, n, &e) || region_open(&r, p->region, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     for (size_t i = 0; i < t->nrow; i++) {
         const double mean = 0.5 * (xx[i] + yy[i]), half = 0.5 * hypot(xx[i] - yy[i], 2 * xy[i]);

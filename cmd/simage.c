@@ -394,6 +394,16 @@ static void all_inputs(const struct request *r, const struct common *c, const ch
     inputs[3] = r->wcs ? r->wcs : c->argv[0];
 }
 
+/* Both outputs can be opened: told before the scene is drawn. */
+static void check_outputs(const struct request *r, const struct common *c)
+{
+    const char *inputs[4];
+    struct err e;
+    all_inputs(r, c, inputs);
+    if (!c->check && (outfile_ready(c->out, inputs, 4, &e) || (r->truth && outfile_ready(r->truth, inputs, 4, &e))))
+        die(EXIT_RUN, "%s", e.text);
+}
+
 /* What is in the image, beside it. */
 static void write_truth(struct input *in, const struct request *r, const struct common *c, const struct header *h,
                         const double *x, const double *y, const char *record)
@@ -415,6 +425,7 @@ static void run(const struct request *r, const struct common *c, const char *rec
     struct emission emission = {0};
     struct plan plan = {0};
     struct err e;
+    check_outputs(r, c);
     read_scene(&in, r, c);
     read_psf(&in, r, c, &v);
     read_wcs(&in, r, c);

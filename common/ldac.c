@@ -72,21 +72,6 @@ static int put_head(struct fits_out *f, const struct image *im, struct err *e)
     return st;
 }
 
-/* Keywords of images that tables must not have. */
-static void drop_image_keywords(struct table *t)
-{
-    size_t n = 0;
-    for (size_t i = 0; i < t->nkey; i++) {
-        if (strcmp(t->key[i].name, "BUNIT") != 0) {
-            t->key[n++] = t->key[i];
-            continue;
-        }
-        free(t->key[i].name);
-        free(t->key[i].value);
-    }
-    t->nkey = n;
-}
-
 int ldac_write(const struct table *t, const struct image *im, const char *name, const char *record,
                const char *const *inputs, size_t n_inputs, struct err *e)
 {
@@ -96,7 +81,6 @@ int ldac_write(const struct table *t, const struct image *im, const char *name, 
         table_free(&copy);
         return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
     }
-    drop_image_keywords(&copy);
     int st = fits_out_open(&f, name, inputs, n_inputs, e);
     if (!st) {
         st = fits_out_hdu(f, -32, 0, 0, 1, NULL, e);

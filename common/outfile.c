@@ -306,6 +306,15 @@ int outfile_open(struct outfile **o, const char *name, const char *const *inputs
     return OK;
 }
 
+int outfile_ready(const char *name, const char *const *inputs, size_t n_inputs, struct err *e)
+{
+    struct outfile *o;
+    int st = outfile_open(&o, name, inputs, n_inputs, e);
+    if (st == OK)
+        outfile_abandon(o);
+    return st;
+}
+
 /* ---- writing ---- */
 
 static int failed(struct outfile *o, int status)

@@ -23,6 +23,9 @@ struct outfile;
 MUST_CHECK int outfile_open(struct outfile **o, const char *name, const char *const *inputs,
                             size_t n_inputs, struct err *e);
 
+/* OK when the file could be opened now, else the cause: told before hours of work, and before another output appears. */
+MUST_CHECK int outfile_ready(const char *name, const char *const *inputs, size_t n_inputs, struct err *e);
+
 /*
  * 1 when two output names mean one file (by name, link or folder; "-" is one
  * file with itself), also when neither exists yet.

@@ -107,6 +107,24 @@ fails "output is the input" 1 addnoise fifty.fits -o fifty.fits
 ok "--check" addnoise --check --depth 27.7 flat.fits -o no.fits
 [ ! -e no.fits ] && pass "--check writes nothing" || fail "--check wrote"
 
+# exposures of one file without numbers of their own would share their noise
+$F make two.fits 0 0 0
+for k in 1 2; do $F add two.fits 16 16 50 "EXTNAME = 'SCI     '" "EXTVER  = $k" "$pc" "$ex" "$bu" "$mz"; done
+fails "two exposures without EXPNUM" 1 addnoise two.fits -o no.fits
+perl -pe "s/EXTVER  = (\\d)/EXPNUM  = \$1/g" two.fits >numbered.fits
+ok "two exposures with EXPNUM" addnoise numbered.fits -o t.fits
+$F dump t.fits 1 >a.txt; $F dump t.fits 2 >b.txt
+cmp -s a.txt b.txt && fail "they have the same noise" || pass "they have different noise"
+perl -pe "s/EXTVER  = (\\d)/EXPNUM  = 7/g" two.fits >numbered.fits
+fails "two exposures of one EXPNUM" 1 addnoise numbered.fits -o no.fits
+
+# the level of saturation of the input in the units of the output
+$F make full.fits 8 8 50 "$pc" "$ex" "$bu" "$mz" "SATURATE= 50000."
+addnoise --gain 4 full.fits -o t.fits
+near "SATURATE of 50000 electrons in adu of 4" "$(card t.fits SATURATE)" 12500 1e-9
+addnoise --gain 4 --sky-rate 20 --subtract-sky full.fits -o t.fits
+near "less the sky that is taken off" "$(awk -v s="$(card t.fits SATURATE)" -v l="$(card t.fits SKYLEVEL)" 'BEGIN { print s + l }')" 12500 1e-6
+
 # the scene's seed stays, the noise's goes beside it, and the input is named by its sum
 $F make seeded.fits 8 8 50 "$pc" "$ex" "$bu" "$mz" "SEED    = '12      '"
 ok "noise on a scene of seed 12" addnoise -s 34 seeded.fits -o t.fits

@@ -50,3 +50,5 @@ cp scene.txt models.txt elsewhere
   rrgshape -j 2 noisy_0,0.fits g0.cat --stars ./stars.rrg --segmentation seg.fits >g0.rrg
   cutcat -j 2 g0.rrg --stars stars.rrg --snr 10 >g0.use )
 for f in psf.fits noisy_0,0.fits seg.fits g0.cat g0.rrg g0.use; do same "same bytes elsewhere with two threads: $f" $f elsewhere/$f; done
+near "lines of HISTORY that end in blanks" "$(grep -c '^# HISTORY.* $' g0.use)" 0 0
+between "lines of HISTORY" "$(grep -c "^# HISTORY" g0.use)" 6 20

@@ -1,0 +1,57 @@
+# Programs with several outputs and inputs: no output replaces a file that is read, by any of its roles; and where one
+# output cannot be made none appears.
+small_chain
+cp noisy.fits wht.fits; cp noisy.fits second.fits; cp noisy.fits second_wht.fits; cp psf.fits kernel.fits
+perl "$TOP/tests/fits.pl" make zero.fits 120 120 0
+printf '# DX DY\n0 0\n0.5 0\n' >off.txt
+echo dith.fits >list
+drizzle dith.fits -o drz.fits
+sum() { cat ./*.fits ./*.txt ./*.rrg list | cksum; }
+before=$(sum)
+
+# guarded WHAT FILE... -- COMMAND: with OUT in it standing for each of the files in turn
+guarded() {
+    local what=$1 files=() f wrong=; shift
+    while [ "$1" != -- ]; do files+=("$1"); shift; done
+    shift
+    for f in "${files[@]}"; do
+        local st=0
+        timeout 60 "${@/OUT/$f}" >o 2>e </dev/null || st=$?
+        [ $st -eq 1 ] && grep -q "$f: is also an input" e && [ ! -e made ] && [ "$(sum)" = "$before" ] || wrong="$wrong $f: exit $st: $(head -c 200 e);"
+        rm -f made
+    done
+    if [ -z "$wrong" ]; then pass "$what: none of ${files[*]} is replaced"; else fail "$what:$wrong"; fi
+}
+guarded "detect -o" noisy.fits wht.fits zero.fits second.fits second_wht.fits -- detect noisy.fits --weight wht.fits --mask zero.fits --measure second.fits --measure-weight second_wht.fits -o OUT
+guarded "detect --region" noisy.fits wht.fits zero.fits second.fits second_wht.fits -- detect noisy.fits --weight wht.fits --mask zero.fits --measure second.fits --measure-weight second_wht.fits -o made --region OUT
+guarded "detect --check-image" noisy.fits wht.fits zero.fits second.fits second_wht.fits -- detect noisy.fits --weight wht.fits --mask zero.fits --measure second.fits --measure-weight second_wht.fits -o made --check-image rms=OUT
+guarded "rrgshape -o" noisy.fits cat.txt stars.rrg wht.fits zero.fits -- rrgshape noisy.fits cat.txt --stars stars.rrg --weight wht.fits --segmentation zero.fits -o OUT
+guarded "rrgshape --region" noisy.fits cat.txt stars.rrg wht.fits zero.fits -- rrgshape noisy.fits cat.txt --stars stars.rrg --weight wht.fits --segmentation zero.fits -o made --region OUT
+guarded "rrgshape -o, stars of this run" stars.fits scat.txt -- rrgshape noisy.fits cat.txt --stars stars.fits,scat.txt -o OUT
+guarded "rrgshape --region, PSF" kernel.fits -- rrgshape noisy.fits cat.txt --psf kernel.fits -o made --region OUT
+guarded "rrgshape --stars-only" stars.fits scat.txt -- rrgshape --stars-only stars.fits scat.txt -o OUT
+guarded "simage -o" scene.txt models.txt psf.fits noisy.fits -- simage scene.txt --models models.txt -p psf.fits --wcs noisy.fits -x 0.1 -o OUT
+guarded "simage --truth" scene.txt models.txt psf.fits noisy.fits -- simage scene.txt --models models.txt -p psf.fits --wcs noisy.fits -x 0.1 -o made --truth OUT
+guarded "galgen -o" models.txt -- galgen --library models.txt -n 3 -o OUT
+guarded "galgen --models" models.txt -- galgen --library models.txt -n 3 -o made --models OUT
+guarded "dither" half.fits off.txt -- dither half.fits --offsets off.txt -o OUT
+guarded "addnoise" true.fits kernel.fits -- addnoise true.fits --depth 27 --depth-definition point5 -p kernel.fits -o OUT
+guarded "drizzle" dith.fits drz.fits list -- drizzle @list --like drz.fits --flat -o OUT
+guarded "psfgen" kernel.fits -- psfgen --from kernel.fits -o OUT
+guarded "cutcat" shapes.txt stars.rrg -- cutcat shapes.txt --stars stars.rrg -o OUT
+guarded "fom" cut.txt shapes.txt -- fom cut.txt shapes.txt -o OUT
+
+none() { # WHAT COMMAND...: one of the outputs is in a folder that is not there, the other would be `made`
+    local what=$1; shift
+    fails "$what" 1 "$@"
+    if [ -e made ]; then fail "$what: and the other appeared"; rm -f made; fi
+}
+none "detect, no catalogue" detect noisy.fits --check-image rms=made -o nowhere/cat
+none "detect, no region" detect noisy.fits --check-image rms=made --region nowhere/reg -o cat
+none "detect, no check image" detect noisy.fits --check-image rms=nowhere/rms --region made -o cat
+none "rrgshape, no catalogue" rrgshape noisy.fits cat.txt --psf none --region made -o nowhere/cat
+none "rrgshape, no region" rrgshape noisy.fits cat.txt --psf none --region nowhere/reg -o made
+none "simage, no image" simage scene.txt --models models.txt -x 0.1 --truth made -o nowhere/image
+none "simage, no truth" simage scene.txt --models models.txt -x 0.1 --truth nowhere/truth -o made
+none "galgen, no list" galgen -n 3 --models made -o nowhere/scene
+none "galgen, no models" galgen -n 3 --models nowhere/models -o made
