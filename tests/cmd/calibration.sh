@@ -7,7 +7,7 @@ stamp=$(stat -c %Y.%Z out/sim1-0.10-01-1a-mirror-exact.fits)
 ok "the whole" run
 near "what was there stays" "$stamp" "$(stat -c %Y.%Z out/sim1-0.10-01-1a-mirror-exact.fits)" 0
 near "figure" "$(head -c 4 out/slopes.png | grep -ac PNG)" 1 0
-near "sections of the table" "$(grep -c '^==' out/table.txt)" 23 0
+near "sections of the table" "$(grep -c '^==' out/table.txt)" 26 0
 near "no images are left" "$(find out -name '*.part*' | wc -l)" 0 0
 exact=$("$BIN/fom" -q --draws 0 out/sim1-0.10-*-{0,1a,1d}-forced-exact.fits -o x.cat && col x.cat BPAIR1)
 plain=$("$BIN/fom" -q --draws 0 out/sim1-0.10-*-{0,1a,1d}-forced-plain.fits -o x.cat && col x.cat BPAIR1)
