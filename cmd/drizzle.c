@@ -11,6 +11,24 @@
 #include <string.h>
 #include <unistd.h>
 
+/* CPU seconds, good to a factor 2: input pixels by the kernel and the map, output pixels by what is written. */
+static double predict(const struct stack *s)
+{
+    static const double drop[] = {[DRIZZLE_SQUARE] = 18e-9, [DRIZZLE_POINT] = 3e-9, [DRIZZLE_TURBO] = 20e-9,
+                                  [DRIZZLE_GAUSSIAN] = 60e-9, [DRIZZLE_LANCZOS2] = 165e-9, [DRIZZLE_LANCZOS3] = 370e-9};
+    double t = (s->choice.flat ? 2e-9 : 6e-9) * (double)s->nx * (double)s->ny;
+    for (size_t i = 0; i < s->n; i++) {
+        const struct shot *x = &s->shot[i];
+        const struct drizzle_map *m = &x->map;
+        const int bent = m->node_x != NULL, turned = bent || m->xy != 0 || m->yx != 0;
+        double pixel = drop[s->choice.kernel] + (turned ? 8e-9 : 3e-9) * m->scale * m->scale + (turned ? 8e-9 : 0) + (bent ? 40e-9 : 0);
+        if (!turned && s->choice.kernel <= DRIZZLE_POINT && !drizzle_splits(s->choice.kernel, s->choice.pixfrac, m, x->x.nx, x->x.ny))
+            pixel = 3e-9;
+        t += pixel * (double)x->x.nx * (double)x->x.ny;
+    }
+    return t;
+}
+
 static void plan(const struct stack *s)
 {
     double pixels = 0;
@@ -25,8 +43,8 @@ static void plan(const struct stack *s)
         fprintf(stderr, "unknown scale");
     else
         fprintf(stderr, "%.6g arcsec", s->scale);
-    fprintf(stderr, ", %s, pixfrac %g, noise factor %.4f\n", stack_kernel_name[s->choice.kernel], s->choice.pixfrac,
-            header_double_or(&s->hdr, "NOISECOR", 1));
+    fprintf(stderr, ", %s, pixfrac %g, noise factor %.4f, about %.2g s\n", stack_kernel_name[s->choice.kernel], s->choice.pixfrac,
+            header_double_or(&s->hdr, "NOISECOR", 1), predict(s));
 }
 
 /* Lists become the names in them; a list is an input, too. */

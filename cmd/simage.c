@@ -363,8 +363,8 @@ static void draw_field(const struct view *v, const struct request *r, const stru
     if (field_plan(&f, v, FIELD_MARGIN))
         die(EXIT_RUN, "%s: the field is too large for one convolution: leave --method field out", c->argv[0]);
     if (c->check || c->verbose)
-        fprintf(stderr, "simage: one convolution of %ld x %ld pixels of %g\", blurred by %.4f\"; about %.0f MB\n", (long)f.nx * f.split,
-                (long)f.ny * f.split, v->pixel / f.split, f.sigma, 1e-6 * f.bytes);
+        fprintf(stderr, "simage: one convolution of %ld x %ld pixels of %g\", blurred by %.4f\"; about %.2g s and %.0f MB\n", (long)f.nx * f.split,
+                (long)f.ny * f.split, v->pixel / f.split, f.sigma, f.cost + 2e-5 * (double)e->n, 1e-6 * f.bytes);
     if (f.bytes > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", c->argv[0], 1e-6 * f.bytes);
     if (c->check)

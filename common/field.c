@@ -26,6 +26,7 @@ int field_plan(struct field *f, const struct view *v, double margin)
     g.x0 = (int)((g.nx - v->nx) / 2);
     g.y0 = (int)((g.ny - v->ny) / 2);
     g.sigma = sqrt(ALIAS / (2 * M_PI * M_PI * rate * (rate - 2 * u)));
+    g.cost = 25e-9 * g.split * g.split * g.nx * g.ny;
     g.bytes = 17.0 * g.split * g.split * g.nx * g.ny + 16.0 * g.nx * g.ny;
     *f = g;
     return OK;

@@ -23,6 +23,7 @@ struct field {
     int x0, y0;            /* where the image begins in it */
     double sigma;          /* of the Gaussian, arcsec */
     double bytes;
+    double cost;           /* predicted CPU seconds without the objects: transforms of the fine pixels */
 };
 
 /* Choose the grid; margin in arcsec, half of it on each side. v needs a psf. E_RANGE: fine sides above 32768. */

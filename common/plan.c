@@ -16,7 +16,7 @@
 
 #define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
 #define PART_PIXELS 1048576    /* larger stamps are made in parts */
-#define PIXEL_COST 5e-9        /* seconds to sum, convert and write a pixel of the image */
+#define PIXEL_COST 3.5e-9        /* seconds to sum, convert and write a pixel of the image */
 #define MAPPED_LONGEST 10.0    /* seconds for one object without a PSF; those that need more are not drawn */
 
 /* Sides of stamps: multiples of 8 or nearly, with factors 2, 3 and 5. */
@@ -334,7 +334,7 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
         orders = p->matrix[d->matrix].nout + 1;
     double matrix = d->matrix >= 0 ? 0.2e-9 * (double)shapelet_count(s->nmax) * orders * orders : 0;
     if (d->path == PATH_CLOSED)
-        return 1e-6 + matrix + 0.25e-9 * orders * area + 10e-9 * orders * (d->nx + d->ny);
+        return 1e-6 + matrix + 0.17e-9 * orders * area + 7e-9 * orders * (d->nx + d->ny);
     if (d->path == PATH_MAPPED) {
         struct pose q;
         return pose_of(&p->view, s, &q) ? 0 : mapped_cost(s, mapped_nodes(s, stretch_of(q.g)));
@@ -346,7 +346,7 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     double rows = d->mapped ? plane * (20e-9 + 2e-9 * orders) : plane * (0.25e-9 * orders + 1.5e-9);
     if (g->columns)
         rows += 6e-9 * plane;              /* rows of T, made for this stamp */
-    double pixel = 0.8e-9 + 0.25e-9 * log2(d->nx);
+    double pixel = 0.55e-9 + 0.18e-9 * log2(d->nx);
     if (area > 6e5)                        /* beyond the caches */
         pixel *= 1.8;
     return 1.5e-6 + matrix + rows * g->parts + 1e-9 * orders * orders * k / 8 + area * pixel;
