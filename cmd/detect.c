@@ -24,6 +24,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 struct options {
     struct detect_params p;
@@ -446,15 +447,20 @@ static void search(const struct frame *f, const struct program *prog, const stru
     const char *in = inputs[0];
     struct detection d = {0};
     struct progress bar;
+    struct timespec begin, end;
     struct detect_params with_bar = *p;
     with_bar.progress = &bar;
     outputs_ready(o, c, inputs, n_inputs);
     progress_begin(&bar, "detect", DETECT_STEPS, c->quiet);
+    timespec_get(&begin, TIME_UTC);
     detect_or_die(f, in, o, &with_bar, &d);
+    timespec_get(&end, TIME_UTC);
     progress_end(&bar);
     if (c->verbose)
-        fprintf(stderr, "detect: %s: sky %g, rms %g, threshold %g rms, filtered noise %.4f; %zu found, %zu cleaned\n", in,
-                d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned);
+        fprintf(stderr, "detect: %s: sky %g, rms %g, threshold %g rms, filtered noise %.4f; %zu found, %zu cleaned\n"
+                "detect: found and measured in %.4f s\n", in,
+                d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned,
+                difftime(end.tv_sec, begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec));
     char *record = opt_record(prog, own, c);
     for (size_t i = 0; i < o->checks.n; i++)
         write_check(o->checks.v[i], f, p, &d, record, inputs, n_inputs);

@@ -9,7 +9,6 @@
  */
 #include "background.h"
 #include "darksky.h"
-#include "par.h"
 #include "simd.h"
 #include <float.h>
 #include <math.h>
@@ -589,6 +588,11 @@ enum { PIECES = 16 };
 /* The cubic of the interval from node k on (-1 and mx - 1: the lines beyond the outermost nodes) in row y. */
 static struct piece piece_of(const struct mesh *m, long k, long y, double h, long x0)
 {
+    if (m->mx == 1) {
+        double v[2];
+        column_of_row(m, 0, y, v);
+        return (struct piece){.c = {(float)v[0]}};
+    }
     long i = k < 0 ? 0 : k > m->mx - 2 ? m->mx - 2 : k;
     double v0[2], v1[2], c[4];
     column_of_row(m, i, y, v0);
@@ -619,6 +623,12 @@ static long interval_of(const struct mesh *m, double h, long x)
     return k;
 }
 
+/* Where the piece from node k on ends, of n pixels from x0. */
+static long piece_end(const struct mesh *m, long k, long x0, long n)
+{
+    return k == m->mx - 1 || m->first[k + 1] > x0 + n ? n : m->first[k + 1] - x0;
+}
+
 /*
  * The pieces of row y from pixel x0 + *done on, at most PIECES, of n pixels asked
  * for; *k is the next interval, *done how many pixels they cover.
@@ -627,15 +637,8 @@ static int next_pieces(const struct mesh *m, double h, long y, long x0, long n, 
                        struct piece p[PIECES])
 {
     int count = 0;
-    if (m->mx == 1) {
-        double v[2];
-        column_of_row(m, 0, y, v);
-        p[0] = (struct piece){0, (int32_t)n, 0, 0, {(float)v[0], 0, 0, 0}};
-        *done = n;
-        return 1;
-    }
     for (; *done < n && count < PIECES; (*k)++) {
-        long stop = *k == m->mx - 1 || m->first[*k + 1] > x0 + n ? n : m->first[*k + 1] - x0;
+        long stop = piece_end(m, *k, x0, n);
         if (stop <= *done)
             continue;
         p[count] = piece_of(m, *k, y, h, x0);
@@ -675,6 +678,19 @@ WIDE static void subtract_pieces(const struct piece *p, int count, float dt, con
     }
 }
 
+/* The same pixels of one piece in `rows` rows, each with its cubic; the rows of pix and out are so far apart. */
+WIDE static void subtract_column(const struct piece *p, long rows, float dt, const float *restrict pix, size_t pix_stride,
+                                 float pivot, float blank, float *restrict out, size_t out_stride)
+{
+    for (long r = 0; r < rows; r++, pix += pix_stride, out += out_stride) {
+        struct piece q = p[r];
+        for (int i = q.from; i < q.to; i++) {
+            float v = (pix[i] - pivot) - piece_at(&q, dt, i);
+            out[i] = fabsf(v) <= FLT_MAX ? v : blank;
+        }
+    }
+}
+
 void mesh_row(const struct mesh *m, long y, long x0, long n, float *out)
 {
     struct piece p[PIECES];
@@ -701,6 +717,31 @@ void background_subtract(const struct background *b, const float *pix, long y, l
     for (long done = 0, k = interval_of(m, h, x0); done < n;) {
         int count = next_pieces(m, h, y, x0, n, &k, &done, p);
         subtract_pieces(p, count, (float)h, pix, (float)m->pivot, blank, out);
+    }
+}
+
+void background_subtract_box(const struct background *b, const float *pix, size_t stride, struct box box, float blank,
+                             float *out)
+{
+    enum { ROWS = 64 };
+    const struct mesh *m = &b->level;
+    struct piece p[ROWS];
+    double h = (double)m->mx / (double)m->nx;
+    for (long done = 0, k = interval_of(m, h, box.x0); done < box.nx; k++) {
+        long stop = piece_end(m, k, box.x0, box.nx);
+        if (stop <= done)
+            continue;
+        for (long y = 0; y < box.ny; y += ROWS) {
+            long rows = box.ny - y < ROWS ? box.ny - y : ROWS;
+            for (long r = 0; r < rows; r++) {
+                p[r] = piece_of(m, k, box.y0 + y + r, h, box.x0);
+                p[r].from = (int32_t)done;
+                p[r].to = (int32_t)stop;
+            }
+            subtract_column(p, rows, (float)h, pix + (size_t)y * stride, stride, (float)m->pivot, blank,
+                            out + y * box.nx, (size_t)box.nx);
+        }
+        done = stop;
     }
 }
 
@@ -753,7 +794,7 @@ static int finish(struct background *b, struct cells *c)
 int background_measure(struct background *b, const struct image *im, const float *rms_map,
                        const struct background_params *p)
 {
-    if (p->cell < 4 || p->filter < 1 || p->filter % 2 == 0 || p->threads < 1)
+    if (p->cell < 4 || p->filter < 1 || p->filter % 2 == 0)
         return E_RANGE;
     struct cells c = {.im = im, .rms_map = rms_map, .p = p};
     c.mx = (im->nx + p->cell / 2) / p->cell;
@@ -773,9 +814,9 @@ int background_measure(struct background *b, const struct image *im, const float
     c.dark = p->dark ? &dark : NULL;
     int st = p->dark ? darksky_new(&dark, im) : OK;
     if (!st)
-        st = par_for(c.my, 1, p->threads, measure_rows, &c);
+        st = par_team_for(p->team, c.my, 1, measure_rows, &c);
     if (!st && p->dark)
-        st = par_for(c.my, 1, p->threads, darken_rows, &c);
+        st = par_team_for(p->team, c.my, 1, darken_rows, &c);
     darksky_free(&dark);
     if (!st) {
         drop_dead_cells(&c);

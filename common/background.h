@@ -14,6 +14,7 @@
 
 #include "err.h"
 #include "image.h"
+#include "par.h"
 
 /* A smooth function on nx x ny pixels, given at the centres of mx x my cells. */
 struct mesh {
@@ -38,7 +39,7 @@ struct background_params {
     double gain;           /* for `dark`: electrons per unit of the image, 0 unknown: the median of photon
                               noise lies 1/6 electron below its mean and is moved there */
     double removed;        /* sky already subtracted from the image, in its unit: its photon noise is still there */
-    int threads;
+    struct par_team *team; /* threads; NULL: the calling one alone */
     int dark;              /* mean of the dark part of each cell, else Source Extractor's mode, which lies
                               2.5/6 electron below the mean of photon noise */
 };
@@ -68,6 +69,13 @@ double mesh_at(const struct mesh *m, long x, long y);
 /* out[i] = pix[i] - level at (x0 + i, y), NaN and infinite pixels become `blank`. */
 void background_subtract(const struct background *b, const float *pix, long y, long x0, long n,
                          float blank, float *out);
+
+/* The same for a box of pixels: its rows are `stride` apart from pix on, and one after the other in out. */
+struct box {
+    long x0, y0, nx, ny;
+};
+void background_subtract_box(const struct background *b, const float *pix, size_t stride, struct box box, float blank,
+                             float *out);
 
 /* Median of n doubles (v is reordered); mean of the middle two for even n. */
 double background_median(double *v, long n);

@@ -17,11 +17,12 @@
 struct pixel {
     float v;               /* filtered value */
     uint16_t x, y;
-    int32_t up, down;      /* first pixel of the next row with x >= ours - 1 */
+    int32_t up, down;      /* first neighbour in the row above and below */
     int32_t next;          /* chain of a connected set */
     int32_t set;           /* peak it grew from; later its object */
     uint16_t level;
-    uint16_t core;         /* 1: belongs to a branch, not shared */
+    uint8_t core;          /* 1: belongs to a branch, not shared */
+    uint8_t ups, downs, left, right;   /* how many neighbours there are */
 };
 
 struct peak {
@@ -97,47 +98,55 @@ static int load(struct deblend_work *w, const struct segments *s, size_t c)
     return OK;
 }
 
+/* The neighbours of the pixels from .. end-1 of a row in the row other .. stop-1 beside it. */
+static void link_row(struct pixel *p, int32_t from, int32_t end, int32_t other, int32_t stop, int below)
+{
+    int32_t j = other;
+    for (int32_t k = from; k < end; k++) {
+        uint8_t n = 0;
+        while (j < stop && p[j].x + 1 < p[k].x)
+            j++;
+        while (j + n < stop && p[j + n].x <= p[k].x + 1)
+            n++;
+        if (below) {
+            p[k].down = j;
+            p[k].downs = n;
+        } else {
+            p[k].up = j;
+            p[k].ups = n;
+        }
+    }
+}
+
 static void link_rows(struct deblend_work *w)
 {
     struct pixel *p = w->pixel;
-    int32_t n = w->npixel, above = -1;
-    for (int32_t i = 0; i < n;) {
-        int32_t end = i;
-        while (end < n && p[end].y == p[i].y)
-            end++;
-        int joined = above >= 0 && p[above].y + 1 == p[i].y;
-        int32_t j = above;
-        for (int32_t k = i; k < end; k++) {
-            while (joined && j < i && p[j].x + 1 < p[k].x)
-                j++;
-            p[k].up = joined ? j : n;
+    int32_t n = w->npixel, above = 0;
+    for (int32_t i = 0, end; i < n; above = i, i = end) {
+        for (end = i; end < n && p[end].y == p[i].y; end++) {
+            p[end].left = end > i && p[end - 1].x + 1 == p[end].x;
+            p[end].right = end + 1 < n && p[end + 1].y == p[i].y && p[end + 1].x == p[end].x + 1;
         }
-        j = i;
-        for (int32_t k = above; k >= 0 && k < i; k++) {
-            while (joined && j < end && p[j].x + 1 < p[k].x)
-                j++;
-            p[k].down = joined ? j : n;
+        if (above < i && p[above].y + 1 == p[i].y) {
+            link_row(p, i, end, above, i, 0);
+            link_row(p, above, i, i, end, 1);
         }
-        above = i;
-        i = end;
     }
-    for (int32_t k = above; k >= 0 && k < n; k++)
-        p[k].down = n;
 }
 
 /* Indices of the up to 8 neighbours of pixel i inside the component. */
 static int neighbours(const struct deblend_work *w, int32_t i, int32_t out[8])
 {
-    const struct pixel *p = w->pixel;
+    const struct pixel *p = &w->pixel[i];
     int n = 0;
-    for (int32_t k = p[i].up; k < w->npixel && p[k].y + 1 == p[i].y && p[k].x <= p[i].x + 1; k++)
-        out[n++] = k;
-    if (i > 0 && p[i - 1].y == p[i].y && p[i - 1].x + 1 == p[i].x)
+    for (int k = 0; k < p->ups; k++)
+        out[n++] = p->up + k;
+    if (p->left)
         out[n++] = i - 1;
-    if (i + 1 < w->npixel && p[i + 1].y == p[i].y && p[i + 1].x == p[i].x + 1)
+    if (p->right)
         out[n++] = i + 1;
-    for (int32_t k = p[i].down; k < w->npixel && p[k].y == p[i].y + 1 && p[k].x <= p[i].x + 1; k++)
-        out[n++] = k;
+    for (int k = 0; k < p->downs; k++)
+        out[n++] = p->down + k;
     return n;
 }
 
@@ -206,6 +215,15 @@ static int several_maxima(const struct segments *s, size_t c, struct deblend_wor
 
 /* ---- the flood ---- */
 
+/* log2 of v > 0 within 0.01. */
+static double rough_log2(float v)
+{
+    uint32_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    double part = (double)(bits & 0x7fffff) * 0x1p-23;
+    return (double)(bits >> 23) + part * (1.3465 - 0.3465 * part);
+}
+
 /* Levels, the level of every pixel, and pixels ordered from the highest level down. */
 static int sort_levels(struct deblend_work *w, double threshold, long levels)
 {
@@ -218,13 +236,14 @@ static int sort_levels(struct deblend_work *w, double threshold, long levels)
     double peak = 0;
     for (size_t i = 0; i < n; i++)
         peak = (double)w->pixel[i].v > peak ? (double)w->pixel[i].v : peak;
-    for (size_t k = 0; k < m; k++)
-        w->level[k] = (float)(threshold * pow(peak / threshold, (double)k / (double)m));
-    double per_level = peak > threshold ? (double)m / log(peak / threshold) : 0;
+    const double span = peak > threshold ? log2(peak / threshold) : 0, step = exp2(span / (double)m);
+    double per_level = span > 0 ? (double)m / span : 0, low = rough_log2((float)threshold), at = threshold;
+    for (size_t k = 0; k < m; k++, at *= step)
+        w->level[k] = (float)at;
     int32_t *start = w->order + n;         /* counts, then first index of each level */
     memset(start, 0, (m + 1) * sizeof *start);
     for (size_t i = 0; i < n; i++) {
-        double t = log((double)w->pixel[i].v / threshold) * per_level;
+        double t = (rough_log2(w->pixel[i].v) - low) * per_level;
         size_t a = t > 0 ? t < (double)(m - 1) ? (size_t)t : m - 1 : 0;
         while (a > 0 && !(w->pixel[i].v > w->level[a]))
             a--;
@@ -279,9 +298,10 @@ static int add_pixel(struct deblend_work *w, int32_t i)
     int32_t near[8], set = -1;
     int n = neighbours(w, i, near);
     for (int k = 0; k < n; k++) {
-        if (w->pixel[near[k]].set < 0)
+        int32_t other = w->pixel[near[k]].set;
+        if (other < 0 || other == set)
             continue;
-        int32_t other = set_of(w, w->pixel[near[k]].set);
+        other = set_of(w, other);
         set = set < 0 ? other : other == set ? set : join_sets(w, set, other);
     }
     double v = (double)w->pixel[i].v;
@@ -368,8 +388,12 @@ static int flood(struct deblend_work *w, const struct deblend_params *p, double 
         double above = level + 1 < p->levels ? (double)w->level[level + 1] : INFINITY;
         for (int32_t i = from; i < end[k] && !st; i++)
             st = add_pixel(w, w->order[i]);
-        for (int32_t i = from; i < end[k] && !st; i++) {
-            int32_t set = set_of(w, w->pixel[w->order[i]].set);
+        for (int32_t i = from, last = -1; i < end[k] && !st; i++) {
+            int32_t set = w->pixel[w->order[i]].set;
+            if (set == last)
+                continue;
+            last = set;
+            set = set_of(w, set);
             if (w->peak[set].seen == (int32_t)k)
                 continue;
             w->peak[set].seen = (int32_t)k;

@@ -3,7 +3,6 @@
 #include "clean.h"
 #include "deblend.h"
 #include "grow.h"
-#include "par.h"
 #include "progress.h"
 #include "segment.h"
 #include "simd.h"
@@ -234,7 +233,7 @@ static int settle(const struct image *im, const struct detect_params *p, const s
 }
 
 /* Segments to blobs and labels. */
-static int separate(const struct image *im, const float *map, const struct detect_params *p,
+static int separate(const struct image *im, const float *map, const struct detect_params *p, struct par_team *team,
                     const struct segments *s, struct blob_list *all, struct detection *d)
 {
     long tasks = (long)((s->ncomponent + COMPONENTS - 1) / COMPONENTS);
@@ -249,7 +248,7 @@ static int separate(const struct image *im, const float *map, const struct detec
     size_t *base = malloc(((size_t)tasks + 1) * sizeof *base);
     int st = split.owner && split.whole && split.list && base ? OK : E_NOMEM;
     if (!st)
-        st = par_for((long)s->ncomponent, COMPONENTS, p->threads, split_components, &split);
+        st = par_team_for(team, (long)s->ncomponent, COMPONENTS, split_components, &split);
     if (!st)
         st = join_lists(all, split.list, tasks, base);
     for (long i = 0; i < tasks && split.list; i++)
@@ -296,7 +295,7 @@ static int measure_objects(void *ctx, long begin, long end, int worker)
 }
 
 static int measure_all(const struct image *im, const float *map, int relative, const struct detect_params *p,
-                       const struct blob_list *all, struct detection *d)
+                       struct par_team *team, const struct blob_list *all, struct detection *d)
 {
     struct photometry_params phot = p->phot;
     phot.noise = d->noise;
@@ -310,7 +309,7 @@ static int measure_all(const struct image *im, const float *map, int relative, c
     struct field found = {im, &d->background, &d->label, &here, NULL};
     struct measuring t = {{im, &d->background, &d->label, &phot, NULL}, all, d, p->progress, DETECT_STEPS / 2};
     if (p->measure) {
-        struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, p->threads, p->dark_sky};
+        struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, team, p->dark_sky};
         int st = background_measure(&d->measured, p->measure, p->measure_map, &bp);
         if (!st && p->measure_map && relative)
             st = scale_map(p->measure, &d->measured, p->measure_map, 0);
@@ -320,14 +319,14 @@ static int measure_all(const struct image *im, const float *map, int relative, c
         phot.rms_map = p->measure_map;
         t.f = (struct field){p->measure, &d->measured, &d->label, &phot, &found};
     }
-    return par_for((long)all->n, OBJECTS, p->threads, measure_objects, &t);
+    return par_team_for(team, (long)all->n, OBJECTS, measure_objects, &t);
 }
 
 /* Background, noise, filter and threshold into d. */
 static int prepare(const struct image *im, float *map, int relative, const struct detect_params *p,
-                   struct detection *d)
+                   struct par_team *team, struct detection *d)
 {
-    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, p->threads, p->dark_sky};
+    struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, team, p->dark_sky};
     int st = background_measure(&d->background, im, map, &bp);
     if (st)
         return st;
@@ -354,20 +353,22 @@ int detect_run(const struct image *im, float *rms_map, int relative, const struc
     struct detection out = {0};
     struct segments s = {0};
     struct blob_list all = {0};
-    int st = prepare(im, rms_map, relative, p, &out);
+    struct par_team *team = par_team_new(p->threads);
+    int st = prepare(im, rms_map, relative, p, team, &out);
     tick(p->progress, DETECT_STEPS / 8);
     if (!st) {
-        struct segment_params sp = {out.threshold, out.noise, rms_map, p->min_area, p->negative, p->threads};
+        struct segment_params sp = {out.threshold, out.noise, rms_map, p->min_area, p->negative, team};
         st = segment_find(&s, im, &out.background, &out.filter, &sp);
     }
     if (!st)
-        st = separate(im, rms_map, p, &s, &all, &out);
+        st = separate(im, rms_map, p, team, &s, &all, &out);
     tick(p->progress, DETECT_STEPS * 3 / 8);
     segment_free(&s);
     if (!st && p->negative)
         out.n = all.n;
     else if (!st)
-        st = measure_all(im, rms_map, relative, p, &all, &out);
+        st = measure_all(im, rms_map, relative, p, team, &all, &out);
+    par_team_free(team);
     free(all.blob);
     if (st)
         detection_free(&out);

@@ -7,7 +7,7 @@
 #include <malloc.h>
 #endif
 
-enum { LARGE = 2 << 20, MAPPED = 32 << 20, STEP = 1 << 20, KEPT = 1 << 30 };
+enum { LARGE = 2 << 20, MAPPED = 4 << 20, FIRST = 16 << 20, STEP = 1 << 20, KEPT = 1 << 30 };
 
 void pages_large(void *p, size_t bytes)
 {
@@ -34,15 +34,16 @@ void *pages_block(size_t bytes)
 void pages_keep(size_t bytes)
 {
 #ifdef __GLIBC__
-    (void)mallopt(M_MMAP_THRESHOLD, MAPPED);
+    if (bytes > FIRST)
+        bytes = FIRST;
     (void)mallopt(M_TRIM_THRESHOLD, KEPT);
     (void)mallopt(M_TOP_PAD, STEP);
     (void)mallopt(M_ARENA_MAX, 1);
-    if (bytes > MAPPED / 2)
-        bytes = MAPPED / 2;
+    (void)mallopt(M_MMAP_THRESHOLD, FIRST + 1);
     void *p = bytes >= 2 * (size_t)LARGE ? malloc(bytes) : NULL;
     pages_large(p, bytes);
     free(p);
+    (void)mallopt(M_MMAP_THRESHOLD, MAPPED);
 #else
     (void)bytes;
 #endif

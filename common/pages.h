@@ -17,7 +17,7 @@ void *pages_block(size_t bytes);
 
 /*
  * Memory that is freed stays with the program for its next block instead of costing the same faults again (in all
- * threads; blocks of 32 MiB and more still go back), and the next `bytes` of it (of at most 16 MiB) come in large pages.
+ * threads; blocks of 4 MiB and more still go back), and the next `bytes` of it (of at most 16 MiB) come in large pages.
  */
 void pages_keep(size_t bytes);
 

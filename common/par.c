@@ -164,6 +164,11 @@ int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void
     return p.status;
 }
 
+int par_team_size(const struct par_team *team)
+{
+    return team ? team->made + 1 : 1;
+}
+
 void par_team_free(struct par_team *team)
 {
     if (!team)

@@ -34,6 +34,7 @@ MUST_CHECK int par_for(long n, long chunk, int threads, par_body *body, void *ct
 struct par_team;
 struct par_team *par_team_new(int threads);
 MUST_CHECK int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void *ctx);
+int par_team_size(const struct par_team *team);        /* threads, the caller's with them; 1 for NULL */
 void par_team_free(struct par_team *team);
 
 /*

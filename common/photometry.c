@@ -143,11 +143,10 @@ static int cut_stamp(const struct field *f, double cx, double cy, double hx, dou
     s->any_replaced = 0;
     memset(s->replaced, 0, n);
     memset(s->v + n, 0, LANES * sizeof *s->v);
-    for (long y = 0; y < s->ny; y++) {
-        background_subtract(f->b, f->im->pix + (size_t)(y0 + y) * (size_t)nx + (size_t)x0, y0 + y, x0, s->nx, 0,
-                            s->v + y * s->nx);
+    background_subtract_box(f->b, f->im->pix + (size_t)y0 * (size_t)nx + (size_t)x0, (size_t)nx,
+                            (struct box){x0, y0, s->nx, s->ny}, 0, s->v);
+    for (long y = 0; y < s->ny; y++)
         s->any_replaced |= mark_row(f, s, y, own);
-    }
     for (long y = 0; y < s->ny && s->any_replaced; y++)
         mirror_row(f, s, cx, cy, y, own);
     return OK;
@@ -175,13 +174,15 @@ static void row_range(const struct stamp *s, const struct ellipse *e, double r, 
     if (!(d >= 0))
         return;
     d = sqrt(d);
-    double lo = ceil(s->cx - half - d), hi = floor(s->cx - half + d) + 1;
+    double lo = s->cx - half - d, hi = s->cx - half + d;
     lo = lo > 0 ? lo : 0;
-    hi = hi < (double)s->nx ? hi : (double)s->nx;
-    if (hi > lo) {
-        *a = (long)lo;
-        *b = (long)hi;
-    }
+    hi = hi < (double)(s->nx - 1) ? hi : (double)(s->nx - 1);
+    if (!(hi >= lo))
+        return;
+    long first = (long)lo;
+    first += (double)first < lo;
+    *a = first;
+    *b = (long)hi + 1 > first ? (long)hi + 1 : first;
 }
 
 /* Adds sums of v and v r over n pixels, r^2 = a dx^2 + b dx + c >= 0 from dx on. */
@@ -322,7 +323,7 @@ static void gaussian_line(const struct gauss *g, double c, long n, double *w)
     long top = near > 0 ? near < (double)(n - 1) ? (long)near : n - 1 : 0;
     double d = (double)top - c;
     w[top] = exp(-0.5 * d * d / g->w2);
-    double up = exp(-(d + 0.5) / g->w2), down = exp((d - 0.5) / g->w2);
+    double up = exp(-(d + 0.5) / g->w2), down = g->step2 / up;
     for (long i = top + 1; i < n; i++, up *= g->step2)
         w[i] = w[i - 1] * up;
     for (long i = top; i-- > 0; down *= g->step2)
@@ -441,20 +442,29 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
 
 /*
  * Windowed centroid (Bertin's XWIN): Gaussian of FWHM = twice the half-light
- * radius, at least 2 px, steps of twice the offset until it moves less than 2e-4 px.
+ * radius, at least 2 px, steps of twice the offset until that is less than 2e-4 px.
+ * From the second on they are stretched by what the last one left of the offset
+ * lets expect (secant): a wide object in a narrow window needs many plain steps.
  */
 static void window_centroid(const struct stamp *s, double sigma, double *line, double *cx, double *cy)
 {
-    double x = s->cx, y = s->cy;
+    double x = s->cx, y = s->cy, last_x = 0, last_y = 0, step_x = 0, step_y = 0;
     struct gauss g = gauss_of(sigma * sigma);
     for (int i = 0; i < 16; i++) {
         double t[5];
         weighted_sums(s, x, y, &g, line, t);
         if (!(t[0] > 0))
             return;
-        double dx = 2 * t[3] / t[0], dy = 2 * t[4] / t[0];
-        x += dx;
-        y += dy;
+        double dx = 2 * t[3] / t[0], dy = 2 * t[4] / t[0], step2 = step_x * step_x + step_y * step_y, slope = 1;
+        if (step2 > 0)
+            slope = ((last_x - dx) * step_x + (last_y - dy) * step_y) / step2;
+        slope = slope > 0.2 ? slope < 2 ? slope : 2 : 0.2;
+        step_x = dx / slope;
+        step_y = dy / slope;
+        last_x = dx;
+        last_y = dy;
+        x += step_x;
+        y += step_y;
         if (!(fabs(x - s->cx) < 4 * sigma + 1 && fabs(y - s->cy) < 4 * sigma + 1))
             return;
         if (dx * dx + dy * dy < 4e-8) {

@@ -7,7 +7,6 @@
  */
 #include "segment.h"
 #include "grow.h"
-#include "par.h"
 #include "simd.h"
 #include <float.h>
 #include <math.h>
@@ -133,10 +132,14 @@ int segment_filtered(const struct image *im, const struct background *b, const f
 
 /* ---- runs of one strip ---- */
 
+struct stretch {
+    uint16_t y, x0, x1;
+};
+
 struct strip {
-    size_t nrun, cap_run, npix, cap_smooth, cap_value;
-    struct run *run;
-    float *smooth, *value;
+    size_t nrun, cap_run, npix, cap_pair;
+    struct stretch *run;
+    float *pair;           /* of every pixel its filtered and its unfiltered value */
 };
 
 struct search {
@@ -145,25 +148,34 @@ struct search {
     const struct smooth *filter;
     const struct segment_params *p;
     struct strip *strip;
-    struct feeder *feeder;     /* one per worker */
-    float **smooth;            /* a row for each worker */
+    struct scratch *scratch;   /* one per worker */
+};
+
+struct scratch {
+    struct feeder feeder;
+    float *smooth;             /* a row */
+    unsigned char *above;      /* a row and zeros up to a multiple of BLOCK */
 };
 
 static void strip_free(struct strip *s)
 {
     free(s->run);
-    free(s->smooth);
-    free(s->value);
+    free(s->pair);
     *s = (struct strip){0};
 }
 
-/* How many of the BLOCK values exceed the threshold. */
-WIDE static int count_above(const float *v, float threshold)
+/* above[i] = 1 where v exceeds the threshold, else 0. */
+WIDE static void mark_above(const float *restrict v, float threshold, long n, unsigned char *restrict above)
 {
-    int n = 0;
-    for (int i = 0; i < BLOCK; i++)
-        n += v[i] > threshold;
-    return n;
+    for (long i = 0; i < n; i++)
+        above[i] = v[i] > threshold;
+}
+
+/* Take back the pixels that are not finite. */
+WIDE static void unmark_bad(const float *restrict raw, long n, unsigned char *restrict above)
+{
+    for (long i = 0; i < n; i++)
+        above[i] = fabsf(raw[i]) <= FLT_MAX ? above[i] : 0;
 }
 
 /* v = 0 where it does not exceed k * rms; bad pixels have infinite rms. */
@@ -178,55 +190,69 @@ static int add_run(struct strip *s, long y, long x0, long x1, const float *smoot
     size_t n = (size_t)(x1 - x0);
     int st = grow(&s->run, &s->cap_run, s->nrun + 1, sizeof *s->run);
     if (!st)
-        st = grow(&s->smooth, &s->cap_smooth, s->npix + n, sizeof *s->smooth);
-    if (!st)
-        st = grow(&s->value, &s->cap_value, s->npix + n, sizeof *s->value);
+        st = grow(&s->pair, &s->cap_pair, 2 * (s->npix + n), sizeof *s->pair);
     if (st)
         return st;
-    s->run[s->nrun++] = (struct run){(int32_t)y, (int32_t)x0, (int32_t)x1, -1, s->npix};
-    memcpy(s->smooth + s->npix, smooth + x0, n * sizeof *smooth);
-    memcpy(s->value + s->npix, plain + x0, n * sizeof *plain);
+    s->run[s->nrun++] = (struct stretch){(uint16_t)y, (uint16_t)x0, (uint16_t)x1};
+    float *to = s->pair + 2 * s->npix;
+    for (size_t i = 0; i < n; i++) {
+        to[2 * i] = smooth[(size_t)x0 + i];
+        to[2 * i + 1] = plain[(size_t)x0 + i];
+    }
     s->npix += n;
     return OK;
 }
 
-/* Runs of one row. raw: the image's row, whose pixels that are not finite end a run. */
-static int scan_row(struct strip *s, long y, long nx, float threshold, const float *raw,
-                    const float *smooth, const float *plain)
+/* Bit i of the result is byte i of the BLOCK bytes 0 or 1. */
+static uint64_t bits_of(const unsigned char *byte)
+{
+    uint64_t w[BLOCK / 8], any = 0, bits = 0;
+    memcpy(w, byte, sizeof w);
+    for (int k = 0; k < BLOCK / 8; k++)
+        any |= w[k];
+    for (int k = 0; any && k < BLOCK / 8; k++)     /* the product brings byte i to bit 56 + i */
+        bits |= (w[k] * 0x0102040810204080u >> 56) << 8 * k;
+    return bits;
+}
+
+/* Runs of the bytes 1 of a row. */
+static int scan_row(struct strip *s, long y, long nx, const unsigned char *above, const float *smooth, const float *plain)
 {
     long start = -1;
     for (long x = 0; x < nx; x += BLOCK) {
-        long end = nx - x < BLOCK ? nx : x + BLOCK;
-        if (start < 0 && end - x == BLOCK && count_above(smooth + x, threshold) == 0)
-            continue;
-        for (long i = x; i < end; i++) {
-            int above = smooth[i] > threshold && fabsf(raw[i]) <= FLT_MAX;
-            if (above && start < 0)
+        uint64_t bits = bits_of(above + x), change = bits ^ (bits << 1 | (start >= 0));
+        for (; change; change &= change - 1) {
+            long i = x + __builtin_ctzll(change);
+            if (start < 0) {
                 start = i;
-            if (!above && start >= 0) {
-                int st = add_run(s, y, start, i, smooth, plain);
-                if (st)
-                    return st;
-                start = -1;
+                continue;
             }
+            int st = add_run(s, y, start, i, smooth, plain);
+            if (st)
+                return st;
+            start = -1;
         }
     }
     return start >= 0 ? add_run(s, y, start, nx, smooth, plain) : OK;
 }
 
 /* One strip with a feeder that is open. */
-static int search_strip(const struct search *s, long i, struct feeder *f, float *smooth)
+static int search_strip(const struct search *s, long i, struct scratch *w)
 {
     const struct segment_params *p = s->p;
     long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
     int st = OK;
-    f->next = y0 - f->filter->radius;
+    w->feeder.next = y0 - s->filter->radius;
     for (long y = y0; y < y1 && !st; y++) {
-        const float *plain, *raw = s->im->pix + (size_t)y * (size_t)nx;
-        feeder_row(f, y, smooth, &plain);
+        const float *plain;
+        size_t at = (size_t)y * (size_t)nx;
+        feeder_row(&w->feeder, y, w->smooth, &plain);
         if (p->rms_map)
-            cut_by_map(p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, smooth);
-        st = scan_row(&s->strip[i], y, nx, p->rms_map ? 0 : (float)(p->threshold * p->noise), raw, smooth, plain);
+            cut_by_map(p->rms_map + at, (float)p->threshold, nx, w->smooth);
+        mark_above(w->smooth, p->rms_map ? 0 : (float)(p->threshold * p->noise), nx, w->above);
+        if (s->b->bad)
+            unmark_bad(s->im->pix + at, nx, w->above);
+        st = scan_row(&s->strip[i], y, nx, w->above, w->smooth, plain);
     }
     return st;
 }
@@ -234,72 +260,42 @@ static int search_strip(const struct search *s, long i, struct feeder *f, float 
 static int search_strips(void *ctx, long begin, long end, int worker)
 {
     const struct search *s = ctx;
-    struct feeder *f = &s->feeder[worker];
-    if (!f->im) {
-        *f = (struct feeder){.im = s->im, .b = s->b, .rms_map = s->p->rms_map, .filter = s->filter,
-                             .negative = s->p->negative};
-        int st = feeder_open(f, 0);
-        if (st) {
-            *f = (struct feeder){0};
-            return st;
-        }
-    }
-    if (!s->smooth[worker] && !(s->smooth[worker] = malloc((size_t)s->im->nx * sizeof(float))))
-        return E_NOMEM;
+    struct scratch *w = &s->scratch[worker];
     int st = OK;
+    if (!w->above) {
+        w->feeder = (struct feeder){.im = s->im, .b = s->b, .rms_map = s->p->rms_map, .filter = s->filter,
+                                    .negative = s->p->negative};
+        st = feeder_open(&w->feeder, 0);
+        if (st)
+            w->feeder = (struct feeder){0};
+        w->smooth = malloc((size_t)s->im->nx * sizeof(float));
+        w->above = calloc((size_t)s->im->nx + BLOCK, 1);
+        if (!w->smooth || !w->above)
+            st = E_NOMEM;
+    }
     for (long i = begin; i < end && !st; i++)
-        st = search_strip(s, i, f, s->smooth[worker]);
+        st = search_strip(s, i, w);
     return st;
 }
 
 /* Search with scratch for every worker. */
 static int search_all(struct search *s, long n)
 {
-    size_t workers = (size_t)s->p->threads;
-    s->feeder = calloc(workers, sizeof *s->feeder);
-    s->smooth = calloc(workers, sizeof *s->smooth);
-    int st = s->feeder && s->smooth ? par_for(n, 1, s->p->threads, search_strips, s) : E_NOMEM;
-    for (size_t i = 0; i < workers && s->feeder; i++)
-        feeder_free(&s->feeder[i]);
-    for (size_t i = 0; i < workers && s->smooth; i++)
-        free(s->smooth[i]);
-    free(s->feeder);
-    free(s->smooth);
+    size_t workers = (size_t)par_team_size(s->p->team);
+    s->scratch = calloc(workers, sizeof *s->scratch);
+    int st = s->scratch ? par_team_for(s->p->team, n, 1, search_strips, s) : E_NOMEM;
+    for (size_t i = 0; i < workers && s->scratch; i++) {
+        feeder_free(&s->scratch[i].feeder);
+        free(s->scratch[i].smooth);
+        free(s->scratch[i].above);
+    }
+    free(s->scratch);
     return st;
 }
 
-/* All strips end to end; strips are freed on the way. */
-static int join_strips(struct segments *s, struct strip *strip, long n)
-{
-    for (long i = 0; i < n; i++) {
-        s->nrun += strip[i].nrun;
-        s->npix += strip[i].npix;
-    }
-    s->run = malloc((s->nrun + 1) * sizeof *s->run);
-    s->smooth = malloc((s->npix + 1) * sizeof *s->smooth);
-    s->value = malloc((s->npix + 1) * sizeof *s->value);
-    if (!s->run || !s->smooth || !s->value)
-        return E_NOMEM;
-    size_t run = 0, pix = 0;
-    for (long i = 0; i < n; i++) {
-        struct strip *t = &strip[i];
-        for (size_t k = 0; k < t->nrun; k++) {
-            s->run[run] = t->run[k];
-            s->run[run++].at += pix;
-        }
-        if (t->npix) {
-            memcpy(s->smooth + pix, t->smooth, t->npix * sizeof *s->smooth);
-            memcpy(s->value + pix, t->value, t->npix * sizeof *s->value);
-        }
-        pix += t->npix;
-        strip_free(t);
-    }
-    return OK;
-}
+/* ---- components: runs are numbered through all strips; there are fewer than 2^15 of them in a row, 2^31 in all ---- */
 
-/* ---- components ---- */
-
-static size_t find_root(size_t *parent, size_t i)
+static uint32_t find_root(uint32_t *parent, uint32_t i)
 {
     while (parent[i] != i) {
         parent[i] = parent[parent[i]];     /* path halving */
@@ -308,22 +304,28 @@ static size_t find_root(size_t *parent, size_t i)
     return i;
 }
 
-/* Join runs of neighbouring rows that touch; the smaller index becomes the root. */
-static void join_rows(const struct run *run, size_t a, size_t a_end, size_t b, size_t b_end,
-                      size_t *parent)
+/* A row's runs and the number of the first. */
+struct row {
+    const struct stretch *run;
+    size_t n;
+    uint32_t number;
+};
+
+/* Join runs of neighbouring rows that touch; the smaller number becomes the root. */
+static void join_rows(struct row up, struct row here, uint32_t *parent)
 {
-    while (a < a_end && b < b_end) {
-        if (run[a].x1 < run[b].x0) {
+    for (size_t a = 0, b = 0; a < up.n && b < here.n;) {
+        if (up.run[a].x1 < here.run[b].x0) {
             a++;
-        } else if (run[b].x1 < run[a].x0) {
+        } else if (here.run[b].x1 < up.run[a].x0) {
             b++;
         } else {
-            size_t u = find_root(parent, a), v = find_root(parent, b);
+            uint32_t u = find_root(parent, up.number + (uint32_t)a), v = find_root(parent, here.number + (uint32_t)b);
             if (u < v)
                 parent[v] = u;
             else
                 parent[u] = v;
-            if (run[a].x1 < run[b].x1)
+            if (up.run[a].x1 < here.run[b].x1)
                 a++;
             else
                 b++;
@@ -331,72 +333,105 @@ static void join_rows(const struct run *run, size_t a, size_t a_end, size_t b, s
     }
 }
 
-static void join_runs(const struct segments *s, size_t *parent)
+/* parent[i] = the first run of run i's component. */
+static void join_runs(const struct strip *strip, long n, uint32_t *parent, size_t nrun)
 {
-    for (size_t i = 0; i < s->nrun; i++)
-        parent[i] = i;
-    size_t above = 0, above_end = 0;
-    for (size_t i = 0; i < s->nrun;) {
-        size_t end = i;
-        while (end < s->nrun && s->run[end].y == s->run[i].y)
-            end++;
-        if (above_end > above && s->run[above].y + 1 == s->run[i].y)
-            join_rows(s->run, above, above_end, i, end, parent);
-        above = i;
-        above_end = end;
-        i = end;
-    }
+    struct row up = {0}, here = {0};
+    for (size_t i = 0; i < nrun; i++)
+        parent[i] = (uint32_t)i;
+    for (long k = 0; k < n; k++)
+        for (size_t i = 0; i < strip[k].nrun; i += here.n) {
+            here.run = strip[k].run + i;
+            for (here.n = 1; i + here.n < strip[k].nrun && here.run[here.n].y == here.run->y;)
+                here.n++;
+            if (up.n && up.run->y + 1 == here.run->y)
+                join_rows(up, here, parent);
+            up = here;
+            here.number += (uint32_t)here.n;
+        }
+    for (size_t i = 0; i < nrun; i++)      /* parents come first and know their roots */
+        parent[i] = parent[parent[i]];
 }
 
-/* Number the components that are large enough, in order of their first run, and group the runs. */
-static int group_runs(struct segments *s, long min_area)
+/*
+ * Number the components of at least min_area pixels from 1, in order of their first runs, into number[] at these, 0
+ * for the others; count their runs into first[c + 2] and their pixels into at[c + 1], c from 0.
+ */
+static int count_components(struct segments *s, const struct strip *strip, long n, const uint32_t *parent,
+                            uint32_t *number, size_t nrun, long min_area, size_t **at)
 {
-    size_t n = s->nrun;
-    size_t *parent = malloc((n + 1) * sizeof *parent), *area = calloc(n + 1, sizeof *area);
-    struct run *sorted = malloc((n + 1) * sizeof *sorted);
-    size_t ncomp = 0;
-    size_t *first = NULL;
-    if (!parent || !area || !sorted)
-        goto fail;
-    join_runs(s, parent);
-    for (size_t i = 0; i < n; i++) {
-        parent[i] = find_root(parent, i);
-        area[parent[i]] += (size_t)(s->run[i].x1 - s->run[i].x0);
-    }
-    for (size_t i = 0; i < n; i++) {
-        size_t root = parent[i];
-        if (root == i)
-            s->run[i].component = area[i] >= (size_t)min_area ? (int32_t)ncomp++ : -1;
-        else
-            s->run[i].component = s->run[root].component;
-    }
-    first = calloc(ncomp + 2, sizeof *first);
-    if (!first)
-        goto fail;
-    for (size_t i = 0; i < n; i++)         /* counting sort by component, order kept */
-        if (s->run[i].component >= 0)
-            first[s->run[i].component + 2]++;
-    for (size_t c = 0; c < ncomp; c++)
-        first[c + 2] += first[c + 1];
-    size_t kept = 0;
-    for (size_t i = 0; i < n; i++)
-        if (s->run[i].component >= 0) {
-            sorted[first[s->run[i].component + 1]++] = s->run[i];
-            kept++;
+    size_t i = 0, ncomp = 0;
+    for (long k = 0; k < n; k++)
+        for (size_t j = 0; j < strip[k].nrun; j++, i++)
+            number[parent[i]] += (uint32_t)(strip[k].run[j].x1 - strip[k].run[j].x0);
+    for (i = 0; i < nrun; i++)
+        ncomp += number[i] >= (size_t)min_area;
+    s->first = calloc(ncomp + 2, sizeof *s->first);
+    *at = malloc((ncomp + 1) * sizeof **at);
+    if (!s->first || !*at)
+        return E_NOMEM;
+    (*at)[0] = 0;
+    for (i = 0; i < nrun; i++)
+        if (parent[i] != i) {
+            uint32_t c = number[parent[i]];
+            if (c) {
+                s->first[c + 1]++;
+                s->nrun++;
+            }
+        } else if (number[i] >= (size_t)min_area) {
+            s->npix += number[i];
+            number[i] = (uint32_t)++s->ncomponent;
+            (*at)[number[i]] = s->npix;
+            s->first[number[i] + 1]++;
+            s->nrun++;
+        } else {
+            number[i] = 0;
         }
-    free(s->run);
-    free(parent);
-    free(area);
-    s->run = sorted;
-    s->nrun = kept;
-    s->first = first;
-    s->ncomponent = ncomp;
     return OK;
-fail:
+}
+
+/* The runs and pixels that stay, grouped by component; strips are freed on the way. */
+static int group_runs(struct segments *s, struct strip *strip, long n, long min_area)
+{
+    size_t nrun = 0, *at = NULL, i = 0;
+    for (long k = 0; k < n; k++)
+        nrun += strip[k].nrun;
+    uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
+    int st = parent && number ? OK : E_NOMEM;
+    if (!st) {
+        join_runs(strip, n, parent, nrun);
+        st = count_components(s, strip, n, parent, number, nrun, min_area, &at);
+    }
+    if (!st) {
+        s->run = malloc((s->nrun + 1) * sizeof *s->run);
+        s->smooth = malloc((s->npix + 1) * sizeof *s->smooth);
+        s->value = malloc((s->npix + 1) * sizeof *s->value);
+        st = s->run && s->smooth && s->value ? OK : E_NOMEM;
+    }
+    for (size_t c = 0; c < s->ncomponent && !st; c++)
+        s->first[c + 2] += s->first[c + 1];
+    for (long k = 0; k < n && !st; k++) {
+        const float *pair = strip[k].pair;
+        for (const struct stretch *r = strip[k].run, *end = r + strip[k].nrun; r < end; r++, i++) {
+            size_t many = (size_t)(r->x1 - r->x0);
+            uint32_t c = number[parent[i]];
+            if (c) {
+                size_t to = at[c - 1];
+                s->run[s->first[c]++] = (struct run){r->y, r->x0, r->x1, (int32_t)(c - 1), to};
+                for (size_t x = 0; x < many; x++) {
+                    s->smooth[to + x] = pair[2 * x];
+                    s->value[to + x] = pair[2 * x + 1];
+                }
+                at[c - 1] += many;
+            }
+            pair += 2 * many;
+        }
+        strip_free(&strip[k]);
+    }
     free(parent);
-    free(area);
-    free(sorted);
-    return E_NOMEM;
+    free(number);
+    free(at);
+    return st;
 }
 
 int segment_find(struct segments *s, const struct image *im, const struct background *b,
@@ -406,14 +441,12 @@ int segment_find(struct segments *s, const struct image *im, const struct backgr
         return E_RANGE;
     long n = (im->ny + STRIP - 1) / STRIP;
     struct segments out = {0};
-    struct search search = {im, b, filter, p, calloc((size_t)n, sizeof(struct strip)), NULL, NULL};
+    struct search search = {im, b, filter, p, calloc((size_t)n, sizeof(struct strip)), NULL};
     if (!search.strip)
         return E_NOMEM;
     int st = search_all(&search, n);
     if (!st)
-        st = join_strips(&out, search.strip, n);
-    if (!st)
-        st = group_runs(&out, p->min_area);
+        st = group_runs(&out, search.strip, n, p->min_area);
     for (long i = 0; i < n; i++)
         strip_free(&search.strip[i]);
     free(search.strip);

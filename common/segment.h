@@ -13,19 +13,20 @@
 #include "background.h"
 #include "err.h"
 #include "image.h"
+#include "par.h"
 #include "smooth.h"
 #include <stdint.h>
 
 /* Pixels x0 <= x < x1 of row y; their values start at `at`. */
 struct run {
     int32_t y, x0, x1;
-    int32_t component;     /* index into first[], -1: dropped */
+    int32_t component;     /* index into first[] */
     size_t at;
 };
 
 struct segments {
     size_t nrun, npix;
-    struct run *run;       /* row by row, x rising; after segment_find grouped by component */
+    struct run *run;       /* grouped by component; inside one row by row, x rising, their values one after the other */
     float *smooth;         /* npix filtered values above background */
     float *value;          /* npix unfiltered values above background */
     size_t ncomponent;
@@ -38,12 +39,12 @@ struct segment_params {
     const float *rms_map;  /* rms per pixel, infinite = bad; or NULL */
     long min_area;         /* pixels, >= 1 */
     int negative;          /* look for minima of the image instead */
-    int threads;
+    struct par_team *team; /* threads; NULL: the calling one alone */
 };
 
 /*
- * Find.  Pixels that are not finite count as 0 in the filter and are never
- * detected; outside the image is 0.
+ * Find.  Pixels that are not finite (b->bad says whether there are any) count as 0
+ * in the filter and are never detected; outside the image is 0.
  */
 MUST_CHECK int segment_find(struct segments *s, const struct image *im, const struct background *b,
                             const struct smooth *filter, const struct segment_params *p);

@@ -18,4 +18,11 @@ for scale in 0.04 0.10 0.16; do
     versus "detect, $n x $n pixels of $scale\", source-extractor" "$mine" "$sex f$scale.fits -c empty.sex -CATALOG_NAME sex.fits \
         -CATALOG_TYPE FITS_1.0 -PARAMETERS_NAME p.param -FILTER_NAME k.conv -DETECT_THRESH 1.5 -ANALYSIS_THRESH 1.5 -GAIN 1 -BACK_SIZE 64 -VERBOSE_TYPE QUIET"
 done
+# wall time of the kernel (-v) on one and two threads, taken in turn, the least of each
+for scale in 0.04 0.10 0.16; do
+    for ((i = 0; i < 2 * RUNS; i++)); do
+        for j in 1 2; do detect -v -j $j "f$scale.fits" --kernel 0.15 --threshold 1.5 --threshold-noise pixel -o mine$j.fits 2>&1 | sed -n "s/.*found and measured in/$j/p"; done
+    done | awk -v s=$scale '!t[$1] || $2 < t[$1] { t[$1] = $2 }
+        END { printf "detect, kernel, %s\": one thread %.4f s, two %.4f s, ratio %.2f\n", s, t[1], t[2], t[1] / t[2] }'
+done
 for j in 1 2; do cpu "detect, 4096 x 4096, -j $j: CPU of all threads" detect -q -j $j f0.04.fits --kernel 0.15 --threshold 1.5 --threshold-noise pixel -o mine.fits; done

@@ -57,7 +57,7 @@ static void plane(long nx, long ny, long cell)
         for (long x = 0; x < nx; x++)
             im.pix[y * nx + x] = (float)(1000 + 0.01 * (double)x - 0.02 * (double)y + draw((uint64_t)(y * nx + x)));
     struct background b;
-    struct background_params p = {cell, 3, 0, 0, 1, 0};
+    struct background_params p = {cell, 3, 0, 0, NULL, 0};
     int st = background_measure(&b, &im, NULL, &p);
     if (!check_that(st == OK, "background of %ld x %ld in cells of %ld", nx, ny, cell))
         return;
@@ -90,7 +90,8 @@ static void bad_pixels(void)
 {
     struct image im = {0};
     struct background a, b;
-    struct background_params p = {32, 3, 0, 0, 1, 0}, p2 = {32, 3, 0, 0, 2, 0};
+    struct par_team *team = par_team_new(2);
+    struct background_params p = {32, 3, 0, 0, NULL, 0}, p2 = {32, 3, 0, 0, team, 0};
     if (image_new(&im, 200, 200))
         return;
     for (long i = 0; i < 40000; i++)
@@ -103,6 +104,7 @@ static void bad_pixels(void)
             im.pix[y * 200 + x] = 0;
     check_that(background_measure(&a, &im, NULL, &p) == OK, "bands of NaN and of exact zeros");
     check_that(background_measure(&b, &im, NULL, &p2) == OK, "the same on two threads");
+    par_team_free(team);
     struct check c = check_begin("level and rms where the image is blank or dead");
     for (long y = 0; y < 200; y += 9) {
         check_close(&c, mesh_at(&a.level, 100, y), 5, 0.25);   /* cells of 32: 0.06 sigma, extrapolated */

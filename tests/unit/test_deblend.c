@@ -23,7 +23,7 @@ static int split(struct scene *c, double threshold, const struct deblend_params 
     struct smooth f;
     double node[8] = {0};
     b.level = (struct mesh){c->im.nx, c->im.ny, 1, 1, 0, node, NULL, NULL};
-    struct segment_params sp = {threshold, 1, NULL, 1, 0, 1};
+    struct segment_params sp = {threshold, 1, NULL, 1, 0, NULL};
     struct deblend_work *w;
     if (smooth_new(&f, 0) || deblend_work_new(&w) || segment_find(&c->s, &c->im, &b, &f, &sp))
         return 0;

@@ -58,10 +58,10 @@ int main(void)
     long again = 0;
     for (int k = 0; k < 20; k++) {         /* what was freed is there for the next */
         before = faults();
-        char *block = malloc(4000000);
-        if (!check_that(block != NULL, "a block of 4 MB"))
+        char *block = malloc(1900000);
+        if (!check_that(block != NULL, "a block of 1.9 MB"))
             break;
-        for (size_t i = 0; i < 4000000; i += 1024)
+        for (size_t i = 0; i < 1900000; i += 1024)
             block[i] = 1;
         free(block);
         again = faults() - before;

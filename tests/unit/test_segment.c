@@ -62,8 +62,10 @@ static int compare(long nx, long ny, double threshold, long min_area, int nans, 
             size[label[i]]++;
     for (size_t i = 0; i < n; i++)
         wanted += size[i] >= min_area;
-    struct segment_params p = {threshold, 1, rms, min_area, 0, 2};
+    struct par_team *team = par_team_new(2);
+    struct segment_params p = {threshold, 1, rms, min_area, 0, team};
     int good = segment_find(&s, &im, &b, &filter, &p) == OK && (long)s.ncomponent == wanted;
+    par_team_free(team);
     long *of = malloc((s.ncomponent + 1) * sizeof *of);
     for (size_t c = 0; good && c < s.ncomponent; c++) {
         long here = 0;
@@ -138,9 +140,12 @@ static void filtered(void)
     check_close(&c, sqrt(q / ((NX - 20) * (NY - 20.0))), smooth_noise(&f), 0.03 * smooth_noise(&f));
     check_end(&c);
     struct segments one, two;
-    struct segment_params p = {0.3, 1, NULL, 3, 0, 1}, p2 = {0.3, 1, NULL, 3, 0, 2};
+    struct par_team *team = par_team_new(2);
+    struct segment_params p = {0.3, 1, NULL, 3, 0, NULL}, p2 = {0.3, 1, NULL, 3, 0, team};
+    check_that(par_team_size(team) == 2 && par_team_size(NULL) == 1, "a team of two");
     if (segment_find(&one, &im, &b, &f, &p) || segment_find(&two, &im, &b, &f, &p2))
         return;
+    par_team_free(team);
     check_that(one.nrun == two.nrun && !memcmp(one.run, two.run, one.nrun * sizeof *one.run)
                && !memcmp(one.smooth, two.smooth, one.npix * sizeof(float)), "1 and 2 threads: same runs, %zu", one.nrun);
     segment_free(&one);
