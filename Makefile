@@ -83,11 +83,11 @@ check-large: all $(UNIT) $(TOOLS)    # tests that need time or memory
 	BIN=$(BIN) BUILD=$(BUILD) tests/run $(sort $(wildcard tests/large/*.sh))
 
 sanitize:    # the tests again under AddressSanitizer and UndefinedBehaviorSanitizer
-	$(MAKE) check BUILD=build/sanitize BIN=build/sanitize/bin CFLAGS='-O1 -g' \
+	LIMIT=3600 $(MAKE) check BUILD=build/sanitize BIN=build/sanitize/bin CFLAGS='-O1 -g' \
 	    SAN='-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer'
 
 tsan:    # the tests again under ThreadSanitizer
-	$(MAKE) check BUILD=build/tsan BIN=build/tsan/bin CFLAGS='-O2 -g' SAN='-fsanitize=thread'
+	LIMIT=3600 $(MAKE) check BUILD=build/tsan BIN=build/tsan/bin CFLAGS='-O2 -g' SAN='-fsanitize=thread'
 
 fuzz:    # RUNS (100000) random inputs for each reader, guided by coverage; needs clang
 	tests/fuzz/run $(RUNS)

@@ -37,6 +37,9 @@ static void parse_zernike(const char *text, struct pupil *p)
             die(EXIT_USAGE, "option --zernike: '%s': J:WAVES,... with J from 1 to %d is needed", text, ZERNIKE_MAX);
         if (p->terms == PUPIL_TERMS)
             die(EXIT_USAGE, "option --zernike: more than %d terms", PUPIL_TERMS);
+        for (int k = 0; k < p->terms; k++)
+            if (p->noll[k] == (int)j)
+                die(EXIT_USAGE, "option --zernike: '%s': Z%d is given twice", text, (int)j);
         p->noll[p->terms] = (int)j;
         p->waves[p->terms++] = waves;
     }
@@ -122,6 +125,8 @@ static void check_options(const struct psfgen *g, const struct opt *own, const s
     for (size_t i = 0; g->from && i < sizeof tel / sizeof *tel; i++)
         if (opt_given(own, c, tel[i]))
             die(EXIT_USAGE, "option --%s: a PSF from a file has no telescope: leave out this or --from", tel[i]);
+    if (opt_given(own, c, "x-image") != opt_given(own, c, "y-image"))
+        die(EXIT_USAGE, "--x-image and --y-image are one position: give both");
     for (size_t i = 0; !g->from && i < sizeof file / sizeof *file; i++)
         if (opt_given(own, c, file[i]))
             die(EXIT_USAGE, "option --%s: only with --from", file[i]);

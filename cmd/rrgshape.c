@@ -294,6 +294,17 @@ static size_t inputs_of(const struct params *p, const struct common *c, const ch
     return n;
 }
 
+/* Every output can be opened: told before the work, and before one of them appears. */
+static void outputs_ready(const struct params *p, const struct common *c)
+{
+    const char *inputs[INPUTS], *out[] = {c->out, p->region, p->plain};
+    const size_t n = inputs_of(p, c, inputs);
+    struct err e;
+    for (int i = 0; i < 3 && !c->check; i++)
+        if (out[i] && outfile_ready(out[i], inputs, n, &e))
+            die(EXIT_RUN, "%s", e.text);
+}
+
 /* --stars IMAGE,CATALOGUE is two files, unless one has that name. */
 static void split_stars(struct params *p)
 {
@@ -329,7 +340,7 @@ static void write_region(const struct table *t, const struct params *p, const st
     const double *xx = table_reals(t, "JXX_RAW"), *xy = table_reals(t, "JXY_RAW"), *yy = table_reals(t, "JYY_RAW");
     const int64_t *flags = table_ints(t, "FLAGS_RRG");
     const struct column *number = table_find(t, "NUMBER");
-    if (outfile_ready(c->out, inputs, n, &e) || region_open(&r, p->region, inputs, n, &e))
+    if (region_open(&r, p->region, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
     for (size_t i = 0; i < t->nrow; i++) {
         const double mean = 0.5 * (xx[i] + yy[i]), half = 0.5 * hypot(xx[i] - yy[i], 2 * xy[i]);
@@ -465,6 +476,7 @@ int main(int argc, char **argv)
     if (p.plain && (p.stars_only || outfile_same(p.plain, c.out) || (p.region && outfile_same(p.plain, p.region))))
         die(EXIT_USAGE, "--plain %s: not with --stars-only, and not another output", p.plain);
     split_stars(&p);
+    outputs_ready(&p, &c);
     struct input in;
     struct table curve = {0}, plain = {0};
     read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);

@@ -27,7 +27,7 @@ for p in "$BIN"/*; do
     fails "$n: unknown option" 2 "$n" --no-such-option
     fails "$n: unknown letter" 2 "$n" -@
     fails "$n: misspelt option" 2 "$n" --sede 3
-    grep -q -- '--seed' cmd.err || fail "$n: --sede did not name --seed: $(cat cmd.err)"
+    grep -qx -- "$n: unknown option --sede: did you mean --seed?" cmd.err || fail "$n: --sede did not name --seed: $(cat cmd.err)"
     for bad in 0 257 1.5 abc '' nan 99999999999999999999; do fails "$n: --threads '$bad'" 2 "$n" --threads "$bad"; done
     for bad in -1 1.5 0x10 1e3 18446744073709551616; do fails "$n: --seed '$bad'" 2 "$n" --seed "$bad"; done
     for bad in 1X -5 nan inf; do fails "$n: --max-memory '$bad'" 2 "$n" --max-memory="$bad"; done

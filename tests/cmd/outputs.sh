@@ -27,6 +27,7 @@ guarded "detect --region" noisy.fits wht.fits zero.fits second.fits second_wht.f
 guarded "detect --check-image" noisy.fits wht.fits zero.fits second.fits second_wht.fits -- detect noisy.fits --weight wht.fits --mask zero.fits --measure second.fits --measure-weight second_wht.fits -o made --check-image rms=OUT
 guarded "rrgshape -o" noisy.fits cat.txt stars.rrg wht.fits zero.fits -- rrgshape noisy.fits cat.txt --stars stars.rrg --weight wht.fits --segmentation zero.fits -o OUT
 guarded "rrgshape --region" noisy.fits cat.txt stars.rrg wht.fits zero.fits -- rrgshape noisy.fits cat.txt --stars stars.rrg --weight wht.fits --segmentation zero.fits -o made --region OUT
+guarded "rrgshape --plain" noisy.fits cat.txt stars.rrg wht.fits zero.fits -- rrgshape noisy.fits cat.txt --stars stars.rrg --weight wht.fits --segmentation zero.fits -o made --plain OUT
 guarded "rrgshape -o, stars of this run" stars.fits scat.txt -- rrgshape noisy.fits cat.txt --stars stars.fits,scat.txt -o OUT
 guarded "rrgshape --region, PSF" kernel.fits -- rrgshape noisy.fits cat.txt --psf kernel.fits -o made --region OUT
 guarded "rrgshape --stars-only" stars.fits scat.txt -- rrgshape --stars-only stars.fits scat.txt -o OUT
@@ -51,6 +52,8 @@ none "detect, no region" detect noisy.fits --check-image rms=made --region nowhe
 none "detect, no check image" detect noisy.fits --check-image rms=nowhere/rms --region made -o cat
 none "rrgshape, no catalogue" rrgshape noisy.fits cat.txt --psf none --region made -o nowhere/cat
 none "rrgshape, no region" rrgshape noisy.fits cat.txt --psf none --region nowhere/reg -o made
+none "rrgshape, no catalogue, --plain" rrgshape noisy.fits cat.txt --psf none --plain made -o nowhere/cat
+none "rrgshape, no second catalogue" rrgshape noisy.fits cat.txt --psf none --plain nowhere/cat -o made
 none "simage, no image" simage scene.txt --models models.txt -x 0.1 --truth made -o nowhere/image
 none "simage, no truth" simage scene.txt --models models.txt -x 0.1 --truth nowhere/truth -o made
 none "galgen, no list" galgen -n 3 --models made -o nowhere/scene

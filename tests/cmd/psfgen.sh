@@ -184,7 +184,8 @@ ok "a long image takes a larger grid" psfgen --scale 0.1 --size 300 -o long.fits
 near "its grid" "$(card long.fits PUPILN)" 448 0
 fails "aberration too steep" 1 psfgen --zernike 4:90 -o no.fits
 fails "memory" 1 psfgen --max-memory 1M -o no.fits
-for z in 0:1 4 4:nan 4:0.1,x 1.5:1 4:0.1, 9999:1; do fails "--zernike $z" 2 psfgen --zernike "$z" -o no.fits; done
+fails "one coordinate of a PSFEx position" 2 psfgen --from psf.fits --x-image 3 -o no.fits
+for z in 4:0.1,5:0.1,4:0.2 0:1 4 4:nan 4:0.1,x 1.5:1 4:0.1, 9999:1; do fails "--zernike $z" 2 psfgen --zernike "$z" -o no.fits; done
 for a in "--diameter -1" "--obscuration 1.1" "--size 0" "--wavelength nan" "--diffusion -1" "--telescope jwst" "--bandwidth 1e9" "--bandwidth 2000" "extra"; do
     # shellcheck disable=SC2086
     fails "$a" 2 psfgen $a -o no.fits

@@ -1,8 +1,8 @@
 # Every program (its output called .png, which only fits2png asks for) in bad surroundings: few descriptors, a small stack, no home, junk
 # locale and time zone, a removed working folder, closed descriptors, two runs on
 # one output; and bad files in all of them: one line, under 64 MiB and 1 s.
-memory=yes
-if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then memory=; fi    # sanitizers reserve far more
+memory=yes patience=20
+if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then memory=; patience=200; fi    # sanitizers reserve far more, and are slow
 small_chain
 
 in=$PWD
@@ -73,7 +73,7 @@ mkdir bad/folder
 runs=0 wrong=
 try() { # COMMAND...
     local st=0 kib ms wall
-    peak cost timeout 20 "$@" -o box/out.png >o 2>e </dev/null || st=$?
+    peak cost timeout "$patience" "$@" -o box/out.png >o 2>e </dev/null || st=$?
     read -r kib ms wall <cost; runs=$((runs + 1))
     [ $st -eq 1 ] && [ "$(wc -l <e)" -eq 1 ] && grep -q "^$1: .*bad/" e && [ ! -e box/out.png ] && ! LC_ALL=C grep -q '[^ -~]' e || wrong="$wrong $*: exit $st: $(head -c 200 e);"
     [ -z "$memory" ] || { [ $kib -lt 65536 ] && [ $ms -lt 1000 ]; } || wrong="$wrong $*: $kib KiB, $ms ms;"

@@ -10,6 +10,18 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+/* Sanitizers have an allocator of their own and shadow pages beside each page. */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define CHECK_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define CHECK_SANITIZED 1
+#endif
+#endif
+#ifndef CHECK_SANITIZED
+#define CHECK_SANITIZED 0
+#endif
+
 struct check {
     const char *what;
     double worst;        /* largest |got - want| / tolerance so far */

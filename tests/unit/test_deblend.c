@@ -238,6 +238,50 @@ static void sums(void)
     check_end(&e);
 }
 
+static double profile(const double g[6], double x, double y)
+{
+    const double dx = x - g[0], dy = y - g[1], det = g[3] * g[5] - g[4] * g[4];
+    return g[2] * exp(-0.5 * (g[5] * dx * dx - 2 * g[4] * dx * dy + g[3] * dy * dy) / det);
+}
+
+/* Pixels below the saddle of two long Gaussians (x, y, peak, xx, xy, yy) go to the one that is brighter there. */
+static void sharing(void)
+{
+    static const double of[3][2][6] = {
+        {{35, 48, 100, 64, 0, 9}, {58, 48, 100, 9, 0, 64}},
+        {{38, 40, 100, 40, 30, 40}, {52, 56, 60, 40, -30, 40}},
+        {{36, 48, 300, 9, 0, 9}, {60, 46, 40, 60, 20, 30}}};
+    struct check t = check_begin("pixels of two long Gaussians and their mean places against the brighter one's at each pixel");
+    for (int k = 0; k < 3; k++) {
+        struct scene c = {0};
+        struct deblend_params p = {32, 0.005, 5, 5, 0.1, NULL, 0, 0};
+        double n[2] = {0}, x[2] = {0}, s[2] = {0};
+        if (image_new(&c.im, SIDE, SIDE))
+            return;
+        for (long i = 0; i < SIDE * SIDE; i++) {
+            const double u = (double)(i % SIDE), v = (double)(i / SIDE), a = profile(of[k][0], u, v), b = profile(of[k][1], u, v);
+            c.im.pix[i] = (float)(a + b);
+            if (c.im.pix[i] > 0.1f) {
+                n[b > a]++;
+                s[b > a] += a + b;
+                x[b > a] += (a + b) * u;
+            }
+        }
+        if (split(&c, 0.1, &p) && c.list.n == 2) {
+            const int swap = c.list.blob[0].xpeak > c.list.blob[1].xpeak;
+            for (int i = 0; i < 2; i++) {
+                const struct blob *b = &c.list.blob[i ^ swap];
+                check_close(&t, (double)b->n, n[i], 0.03 * n[i]);
+                check_close(&t, b->sx / b->s + b->x0, x[i] / s[i], 0.1);
+            }
+        } else {
+            check_that(0, "two long Gaussians are two: %zu", c.list.n);
+        }
+        done(&c);
+    }
+    check_end(&t);
+}
+
 /* A plateau, a checkerboard of plateaus, a spiral: no recursion, every pixel owned. */
 static void hard_shapes(void)
 {
@@ -297,6 +341,7 @@ int main(void)
     too_large();
     against_slow();
     sums();
+    sharing();
     hard_shapes();
     return check_status();
 }

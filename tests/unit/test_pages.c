@@ -28,6 +28,10 @@ static int system_has_them(void)
 int main(void)
 {
     struct image im;
+    if (CHECK_SANITIZED) {
+        check_skip("large pages: faults are those of the sanitizer");
+        return check_status();
+    }
     if (!check_that(image_new(&im, 4096, 4096) == OK, "an image of 4096 x 4096"))
         return check_status();
     long before = faults();
