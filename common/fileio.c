@@ -24,39 +24,32 @@ int file_open(const char *name, int flags, mode_t mode)
     return high;
 }
 
-int file_write(int fd, const void *buf, size_t n)
+/* To the file's own position (at < 0) or to a given one. */
+static int write_all(int fd, const void *buf, size_t n, int64_t at)
 {
-    const char *p = buf;
-    while (n) {
-        ssize_t k = write(fd, p, n < most ? n : most);
+    for (size_t done = 0; done < n;) {
+        const size_t want = n - done < most ? n - done : most;
+        const char *from = (const char *)buf + done;
+        ssize_t k = at < 0 ? write(fd, from, want) : pwrite(fd, from, want, (off_t)at + (off_t)done);
         if (k < 0 && errno == EINTR)
             continue;
         if (k <= 0) {
             errno = k ? errno : EIO;
             return -1;
         }
-        p += k;
-        n -= (size_t)k;
+        done += (size_t)k;
     }
     return 0;
 }
 
+int file_write(int fd, const void *buf, size_t n)
+{
+    return write_all(fd, buf, n, -1);
+}
+
 int file_pwrite(int fd, const void *buf, size_t n, uint64_t offset)
 {
-    const char *p = buf;
-    while (n) {
-        ssize_t k = pwrite(fd, p, n < most ? n : most, (off_t)offset);
-        if (k < 0 && errno == EINTR)
-            continue;
-        if (k <= 0) {
-            errno = k ? errno : EIO;
-            return -1;
-        }
-        p += k;
-        n -= (size_t)k;
-        offset += (uint64_t)k;
-    }
-    return 0;
+    return write_all(fd, buf, n, (int64_t)offset);
 }
 
 /* Until n bytes or the end, from the file's own position (at < 0) or from a given one. */

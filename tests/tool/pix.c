@@ -7,21 +7,11 @@
  *   pix diff A B                                largest |a - b| / largest |a|, and number of differing pixels
  *   pix sum A                                   sum of the pixels
  */
-#include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static struct image load(const char *name)
-{
-    struct image im;
-    struct err e;
-    if (image_read(&im, name, 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
-    return im;
-}
 
 static void noise(char **name, double limit)
 {

@@ -9,8 +9,7 @@
  * the drop inside the output pixel.  Prints for each image the largest and the rms difference over the rms of the
  * reference where both are numbers, and how many pixels only one of them has.
  */
-#include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,15 +22,6 @@ struct corner {
 struct map {
     double c, s, out_x, out_y, pixfrac;
 };
-
-static struct image load(const char *name)
-{
-    struct image im;
-    struct err e;
-    if (image_read(&im, name, 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
-    return im;
-}
 
 /* Keep the part of a polygon where sign * coordinate <= sign * limit (axis 0: x, 1: y). */
 static int clip(const struct corner *p, int n, int axis, double sign, double limit, struct corner *q)

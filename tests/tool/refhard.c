@@ -11,7 +11,7 @@
  * double.  Poisson: sums of exp(k log m - m - lgamma(k+1)) in long double.
  */
 #include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include "poisson.h"
 #include "shapelet.h"
 #include "shear.h"
@@ -203,10 +203,7 @@ static void flat(const char *side, double value, const char *out)
 
 static void chi2(double mean, const char *name)
 {
-    struct image im;
-    struct err e;
-    if (image_read(&im, name, 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
+    struct image im = load(name);
     const double n = (double)image_count(&im), m = (double)(float)mean, low = floor(fmax(0, m - 6 * sqrt(m))), high = m + 6 * sqrt(m) + 10;
     const size_t cells = (size_t)(high - low) + 2;
     double *seen = calloc(cells, sizeof *seen), sum = 0, want = 0, have = 0, bins = 0;

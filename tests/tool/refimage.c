@@ -16,7 +16,7 @@
  * sqrt(<r^2>) under a Gaussian weight of 0.3 arcsec.
  */
 #include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include <complex.h>
 #include <math.h>
 #include <stdio.h>
@@ -134,10 +134,7 @@ static double brightness(const struct object *o, const double a[4], double x, do
 /* T of the samples at the nodes, by two sums. */
 static void band_open(struct band *b, const char *name, double scale, double cut, double reach)
 {
-    struct image p;
-    struct err e;
-    if (image_read(&p, name, 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
+    struct image p = load(name);
     const double extent = reach + 0.5 * scale * (double)p.nx;
     b->n = 2 * (int)(0.5 * 1.15 * M_PI * cut * extent + 40);
     b->half = b->n / 2;
@@ -257,11 +254,8 @@ static int rising(const void *a, const void *b)
 /* Compare one image with the answers. */
 static void compare(const char *name, int n, const struct object *o, double pixel, int m, const double *want)
 {
-    struct image im;
-    struct err e;
+    struct image im = load(name);
     double worst[OBJECTS], flux = 0, size = 0, *got = need((size_t)m * (size_t)m, sizeof *got);
-    if (image_read(&im, name, 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
     for (int k = 0; k < n; k++) {
         const long x0 = lround(o[k].x) - 1 - m / 2, y0 = lround(o[k].y) - 1 - m / 2;
         const double x = o[k].x - 1 - (double)x0, y = o[k].y - 1 - (double)y0;

@@ -10,7 +10,7 @@
  * inner 2 arcsec over the peak, the relative error of the peak, and the flux left out, 1 - sum.
  */
 #include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include <complex.h>
 #include <math.h>
 #include <stdio.h>
@@ -123,11 +123,8 @@ static void add(const struct pupil *p, double lambda, double scale, double weigh
 
 static void compare(const char *name, int m, const double *want)
 {
-    struct image im;
-    struct err e;
+    struct image im = load(name);
     double worst = 0, square = 0, sum = 0, peak = want[(m / 2) * m + m / 2];
-    if (image_read(&im, name, 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
     if (im.nx < m || im.ny < m || im.nx % 2 == 0 || im.ny % 2 == 0)
         die(EXIT_RUN, "%s: sides must be odd, %d or more", name, m);
     const long x0 = im.nx / 2 - m / 2, y0 = im.ny / 2 - m / 2;

@@ -8,7 +8,7 @@
  * weighted centroid with weight exp(-r^2 / (2 SIGMA^2)).  Shares nothing with rrgshape but the reading of images.
  */
 #include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include <math.h>
 #include <stdio.h>
 
@@ -31,13 +31,10 @@ static void sums_at(const struct image *im, double x, double y, double sigma, do
 
 int main(int argc, char **argv)
 {
-    struct image im;
-    struct err e;
     double x, y, sigma, s[6];
     if (argc != 2)
         die(EXIT_USAGE, "usage: refshape IMAGE < list");
-    if (image_read(&im, argv[1], 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
+    struct image im = load(argv[1]);
     while (scanf("%lf %lf %lf", &x, &y, &sigma) == 3) {
         double step = 1;
         x -= 1;

@@ -6,19 +6,17 @@
  * inverse variance relative to the rest.
  */
 #include "err.h"
-#include "imageio.h"
+#include "load.h"
 #include "rng.h"
 #include <math.h>
 #include <stdlib.h>
 
 int main(int argc, char **argv)
 {
-    struct image im, w;
     struct err e;
     if (argc != 7)
         die(EXIT_USAGE, "spoil IN OUT WEIGHT SEED SLOPE EXPOSURE");
-    if (image_read(&im, argv[1], 4e9, &e) || image_read(&w, argv[1], 4e9, &e))
-        die(EXIT_RUN, "%s", e.text);
+    struct image im = load(argv[1]), w = load(argv[1]);
     double slope = atof(argv[5]), exposure = atof(argv[6]);
     struct rng g = rng_stream((uint64_t)atol(argv[4]), 0, RNG_TEST);
     for (long y = 0; y < im.ny; y++)

@@ -1,18 +1,9 @@
 /* test_fft.c - transforms against their defining sums; sizes; zoom. */
 #include "fft.h"
 #include "check.h"
+#include "random.h"
 #include <stdlib.h>
 #include <string.h>
-
-/* uniform in (-1, 1), fixed sequence */
-static double noise(void)
-{
-    static unsigned long long s = 88172645463325252ULL;
-    s ^= s << 13;
-    s ^= s >> 7;
-    s ^= s << 17;
-    return (double)(s >> 11) / 4503599627370496.0 - 1;
-}
 
 /* sum over a real image, at frequency (ky, kx), sign of the exponent */
 static void direct(int ny, int nx, const double *re, const double *im, double ky, double kx, int sign,

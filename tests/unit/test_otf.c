@@ -1,17 +1,9 @@
 /* test_otf.c - spline of a table, exact transform of samples, factors. */
 #include "otf.h"
 #include "check.h"
+#include "random.h"
 #include <stdlib.h>
 #include <string.h>
-
-static double noise(void)
-{
-    static unsigned long long s = 88172645463325252ULL;
-    s ^= s << 13;
-    s ^= s >> 7;
-    s ^= s << 17;
-    return (double)(s >> 11) / 4503599627370496.0 - 1;
-}
 
 /* a smooth, asymmetric transfer function: two Gaussians, one displaced */
 static void smooth(double x, double y, double *re, double *im)

@@ -5,13 +5,8 @@
 #include "shapeconv.h"
 #include "shapelet.h"
 #include "check.h"
+#include "random.h"
 #include "truth.h"
-
-static double uniform(unsigned long *state)
-{
-    *state = *state * 6364136223846793005ul + 1442695040888963407ul;
-    return (double)(*state >> 11) * 0x1p-53;
-}
 
 static void random_coeff(int nmax, unsigned long seed, double *c)
 {

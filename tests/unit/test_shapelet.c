@@ -4,15 +4,9 @@
  */
 #include "shapelet.h"
 #include "check.h"
+#include "random.h"
 #include "truth.h"
 #include <float.h>
-
-/* Random numbers for the tests: 0 <= u < 1. */
-static double uniform(unsigned long *state)
-{
-    *state = *state * 6364136223846793005ul + 1442695040888963407ul;
-    return (double)(*state >> 11) * 0x1p-53;
-}
 
 /* phi_0..phi_n at x in long double, plain recurrence (its exponent range needs no tricks). */
 static void phi_long(int nmax, long double x, long double *p)
@@ -254,24 +248,12 @@ static void test_pixel_identities(void)
     check_end(&h);
 }
 
-/* c with random entries of unit norm. */
-static void random_coeff(int nmax, unsigned long seed, double *c)
-{
-    double norm = 0;
-    for (size_t i = 0; i < shapelet_count(nmax); i++) {
-        c[i] = 2 * uniform(&seed) - 1;
-        norm += c[i] * c[i];
-    }
-    for (size_t i = 0; i < shapelet_count(nmax); i++)
-        c[i] /= sqrt(norm);
-}
-
 static void test_sums(void)
 {
     struct check c = check_begin("pixel_sum of basis tables is shapelet_value");
     static double f[400], x[70], y[9], bx[21 * 70], by[21 * 9], out[630];
     for (int m1 = 1; m1 <= 70; m1 += 23) {
-        random_coeff(20, 5, f);
+        random_unit(shapelet_count(20), 5, f);
         for (int i = 0; i < m1; i++)
             x[i] = 0.2 * i - 3;
         for (int i = 0; i < 9; i++)
@@ -300,7 +282,7 @@ static void test_fourier(void)
     static double f[28], t[28];
     const int n = 6;
     const double beta = 0.7, h = 0.05, k[3][2] = {{0.3, -1.1}, {2, 1}, {-4, 3.5}};
-    random_coeff(n, 11, f);
+    random_unit(shapelet_count(n), 11, f);
     shapelet_fourier(n, f, t);
     for (int q = 0; q < 3; q++) {
         double re = 0, im = 0, even[28] = {0}, odd[28] = {0};
@@ -325,7 +307,7 @@ static void test_moments(void)
     static double f[66];
     const double beta = 0.9, h = 0.05;
     double m[6], sum[6] = {0};
-    random_coeff(10, 21, f);
+    random_unit(shapelet_count(10), 21, f);
     shapelet_moments(10, beta, f, m);
     for (int i = -240; i <= 240; i++)
         for (int j = -240; j <= 240; j++) {
@@ -383,7 +365,7 @@ static void test_rotation(void)
         for (int a = 0; a < 4; a++) {
             const int n = order[k];
             const double rho = (double[]){0.7, -2.1, M_PI / 2, 100.3}[a];
-            random_coeff(n, (unsigned long)(31 + k), c);
+            random_unit(shapelet_count(n), (unsigned long)(31 + k), c);
             if (shapelet_rotate(n, rho, c, r) || shapelet_rotate(n, -rho, r, back))
                 check_that(0, "rotate refuses");
             for (size_t i = 0; i < shapelet_count(n); i++)
@@ -410,7 +392,7 @@ static void test_rotation(void)
                && shapelet_rotate(2, INFINITY, c, r) == E_RANGE && shapelet_rotation_table(67, table) == E_RANGE, "rotate: domain");
     check_that(shapelet_rotation_count(66) <= sizeof table / sizeof *table, "rotation table of order 66: %zu doubles", shapelet_rotation_count(66));
     struct check w = check_begin("rotate: many turns are their remainder, order 66");
-    random_coeff(66, 8, c);
+    random_unit(shapelet_count(66), 8, c);
     for (int k = 0; k < 3; k++) {
         const double rho = (double[]){1000.7, -3141.59, 200.3}[k];
         const double rest = (double)remainderl(rho, 2 * acosl(-1));
@@ -420,7 +402,7 @@ static void test_rotation(void)
             check_close(&w, r[i], back[i], 1e-14);
     }
     check_end(&w);
-    random_coeff(5, 3, c);
+    random_unit(shapelet_count(5), 3, c);
     memcpy(r, c, sizeof c);
     shapelet_mirror(5, r);
     struct check m = check_begin("mirror: f(x, -y)");

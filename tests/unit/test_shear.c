@@ -6,25 +6,8 @@
 #include "quad.h"
 #include "shapelet.h"
 #include "check.h"
+#include "random.h"
 #include "truth.h"
-
-static double uniform(unsigned long *state)
-{
-    *state = *state * 6364136223846793005ul + 1442695040888963407ul;
-    return (double)(*state >> 11) * 0x1p-53;
-}
-
-/* c with random entries of unit norm. */
-static void random_coeff(int nmax, unsigned long seed, double *c)
-{
-    double norm = 0;
-    for (size_t i = 0; i < shapelet_count(nmax); i++) {
-        c[i] = 2 * uniform(&seed) - 1;
-        norm += c[i] * c[i];
-    }
-    for (size_t i = 0; i < shapelet_count(nmax); i++)
-        c[i] /= sqrt(norm);
-}
 
 /* f(exp(-Gamma) x) from the definition. */
 static double sheared_value(int nmax, double beta, const double *c, double g1, double g2, double x, double y)
@@ -168,7 +151,7 @@ static void test_exact(void)
     struct check d = check_begin("exact: as a matrix");
     for (size_t k = 0; k < sizeof shears / sizeof *shears; k++) {
         const double g1 = shears[k][0], g2 = shears[k][1];
-        random_coeff(6, 40 + k, c);
+        random_unit(shapelet_count(6), 40 + k, c);
         if (shear_exact(6, c, g1, g2, 60, out) || shear_exact(60, out, -g1, -g2, 66, back))
             check_that(0, "exact refuses");
         double norm = 0, m[6], mo[6];
@@ -195,7 +178,7 @@ static void test_exact(void)
     check_end(&f);
     check_end(&l);
     check_end(&d);
-    random_coeff(6, 1, c);
+    random_unit(shapelet_count(6), 1, c);
     int same = shear_exact(6, c, 0, -0.0, 7, out) == OK && memcmp(c, out, sizeof c) == 0;
     for (int i = 28; i < 36; i++)
         same &= out[i] == 0;
@@ -221,7 +204,7 @@ static void test_growth(void)
                     const int nout = nmax + shear_growth(nmax, g, eps);
                     if (nout > 60)
                         continue;
-                    random_coeff(nmax, (unsigned long)kind + 1, c);
+                    random_unit(shapelet_count(nmax), (unsigned long)kind + 1, c);
                     if (kind > 0) {
                         memset(c, 0, sizeof c);      /* single states are the worst */
                         c[kind == 1 ? shapelet_index(nmax, 0) : kind == 2 ? shapelet_index(nmax / 2, nmax - nmax / 2) : shapelet_index(0, nmax)] = 1;
@@ -251,7 +234,7 @@ static void test_series(void)
         double err[2] = {0, 0};
         for (int k = 0; k < 2; k++) {
             const double g1 = (k ? 0.006 : 0.012) * (order > 4 ? 6 : 1), g2 = 0.5 * g1;
-            random_coeff(2, 77, c);
+            random_unit(shapelet_count(2), 77, c);
             if (shear_series(2, c, g1, g2, order, out) || shear_exact(2, c, g1, g2, 60, exact))
                 check_that(0, "series refuses");
             for (size_t i = 0; i < shapelet_count(60); i++) {
@@ -265,7 +248,7 @@ static void test_series(void)
     struct check f = check_begin("series: flux kept with its growth");
     for (int order = 1; order <= 8; order++) {
         double m[6], mo[6];
-        random_coeff(12, 78, c);
+        random_unit(shapelet_count(12), 78, c);
         if (shear_series(12, c, 0.05, -0.02, order, out))
             check_that(0, "series refuses");
         shapelet_moments(12, 1, c, m);
@@ -333,7 +316,7 @@ static void test_grid(void)
     for (int k = 0; k < 6; k++) {
         const int nmax = (int[]){0, 1, 7, 12, 30, 60}[k];
         const double g = (double[]){0.9, -0.5, 0.05, 0.9, 0.3, 0.9}[k];
-        random_coeff(nmax, 60 + (unsigned long)k, c);
+        random_unit(shapelet_count(nmax), 60 + (unsigned long)k, c);
         double a[4];
         if (shear_matrix(-g * 0.6, -g * 0.8, a))
             check_that(0, "matrix");
@@ -355,7 +338,7 @@ static void test_grid(void)
     check_end(&v);
     const double a[4] = {-1.2, 0.4, 0.3, 2};
     struct check m = check_begin("grid: any matrix, negative determinant too");
-    random_coeff(9, 3, c);
+    random_unit(shapelet_count(9), 3, c);
     if (shear_grid(9, 0.9, c, a, 3, x, 70, y, all, NULL))
         check_that(0, "grid refuses");
     for (int j = 0; j < 70; j++)
@@ -377,7 +360,7 @@ static void test_pixels(void)
     for (int k = 0; k < 5; k++) {
         const double h = (double[]){1e-3, 0.05, 0.3, 1.7, 8}[k], g1 = 0.05, g2 = -0.1;
         double a[4];
-        random_coeff(6, 90 + (unsigned long)k, c);
+        random_unit(shapelet_count(6), 90 + (unsigned long)k, c);
         for (int i = 0; i <= 5; i++)
             xe[i] = h * (i - 2.3);
         for (int i = 0; i <= 70; i++)
@@ -393,7 +376,7 @@ static void test_pixels(void)
     for (int k = 0; k < 4; k++) {
         const double g = (double[]){0.9, -0.9, 0.5, 0.999}[k], h = (double[]){0.05, 1, 4, 0.2}[k], e = sqrt((1 + g) / (1 - g));
         double a[4];
-        random_coeff(60, 190 + (unsigned long)k, c);
+        random_unit(shapelet_count(60), 190 + (unsigned long)k, c);
         for (int i = 0; i <= 5; i++)
             xe[i] = h * (i - 2.3);
         for (int i = 0; i <= 70; i++)
@@ -407,7 +390,7 @@ static void test_pixels(void)
     check_end(&d);
     struct check f = check_begin("pixels: they add up to the flux, |g| = 0.9");
     double a[4], m[6], sum = 0;
-    random_coeff(8, 5, c);
+    random_unit(shapelet_count(8), 5, c);
     for (int i = 0; i <= 5; i++)
         xe[i] = 20 * (i - 2.4);
     for (int i = 0; i <= 70; i++)
@@ -419,12 +402,12 @@ static void test_pixels(void)
     shapelet_moments(8, 1, c, m);
     check_close(&f, sum, m[0], 1e-13);
     double whole[2] = {-1e4, 1e4}, one = 0;      /* a single pixel holds everything: 1e4 nodes */
-    random_coeff(60, 6, c);
+    random_unit(shapelet_count(60), 6, c);
     if (shear_matrix(0.54, 0.72, a) || shear_pixels(60, 1, c, a, 1, whole, 1, whole, &one))
         check_that(0, "one large pixel is refused");
     shapelet_moments(60, 1, c, m);
     check_close(&f, one, m[0], 1e-13);
-    random_coeff(8, 5, c);
+    random_unit(shapelet_count(8), 5, c);
     check_end(&f);
     out[0] = 7;
     xe[1] = -100;
