@@ -413,7 +413,7 @@ static void detect_or_die(const struct frame *f, const char *in, const struct op
 static double predict(const struct frame *f)
 {
     const double n = (double)image_count(&f->im);
-    return 0.006 + 4e-9 * n + (f->scale > 0 ? fmin(1e-6 * f->scale * f->scale, 1e-8) * n : 1e-8 * n);
+    return 0.006 + 4e-9 * n + (f->scale > 0 ? fmin(1e-6 * f->scale * f->scale, 1e-7) * n : 1e-8 * n);
 }
 
 static void describe(const struct frame *f, const char *in, const struct detect_params *p)
