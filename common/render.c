@@ -9,7 +9,7 @@
 
 #define HELD 4                 /* chunks that a thread holds, drawn and not yet added, at most */
 #define CHUNK_PIXELS 16384     /* doubles of a chunk of stamps: with HELD of them 512 KiB, half a core's cache */
-#define SPACE_PIXELS 1310720   /* doubles that all threads may hold of stamps larger than that: 10 MiB */
+#define SPACE_PIXELS 1310720   /* doubles that all threads may hold together, and a chunk more each: 10 MiB */
 #define WINDOW_PIXELS 1048576  /* doubles of the window, at most */
 #define PART_PIXELS 1048576    /* pixels, about, of one part of a stamp without a PSF */
 #define PAGE_FLOATS 1024       /* in the smallest page of memory */
@@ -383,7 +383,7 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
     if (q->n == 0)
         return OK;
     struct window w = {.im = im, .height = q->tallest > im->ny ? (int)im->ny : q->tallest};
-    const size_t space = (q->largest > CHUNK_PIXELS ? q->largest : CHUNK_PIXELS) + 8, most = SPACE_PIXELS / space;
+    const size_t space = (q->largest > CHUNK_PIXELS ? q->largest : CHUNK_PIXELS) + 8, most = (SPACE_PIXELS + (size_t)threads * CHUNK_PIXELS) / space;
     int hold = most / (size_t)threads > HELD ? HELD : (int)(most / (size_t)threads);
     if (hold < 1) {                                /* few large stamps at a time */
         threads = most < 1 ? 1 : (int)most;
