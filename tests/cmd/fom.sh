@@ -59,9 +59,12 @@ near "objects of the first bin" "$(col bins.cat NPAIR1 | head -1)" 200 0
 near "both bins together" "$(fom bin? -q -o both.cat; col both.cat BPAIR1)" 1 1e-6
 ok "bins of the distance" fom a? --bins DISTANCE:0,2.9,3.1,9 -q -o dist.cat
 near "all of a grid have neighbours at 3 arcsec" "$(col dist.cat NPAIR1 | tr '\n' ' ' | tr -d ' ')" 04000 0
-for k in 0 1 2 3 4 5 6 7 8; do sed 's/P22 CUT$/P22 D_RRG/' a$k >size$k; done
-ok "bins of the size: D_RRG 0 in all" fom size? --bins SIZE:-1,1 -q -o size.cat
-near "size in one bin" "$(col size.cat NPAIR1)" 400 0
+# 150 objects of 2 pixels of 0.1", the others of 4; 250 with S/N 10, the others with 50
+for k in 0 1 2 3 4 5 6 7 8; do awk '/^# NUMBER/ { print $0, "D_RRG FLUX_AUTO FLUXERR_AUTO"; next } /^#/ { print; next } { print $0, $1 <= 150 ? 2 : 4, 100, $1 <= 250 ? 10 : 2 }' a$k >size$k; done
+ok "bins of the size" fom size? --bins SIZE:0.1,0.3,0.5 -q -o size.cat
+near "150 objects of 0.2 arcsec, 250 of 0.4" "$(col size.cat NPAIR1 | tr -d '\n')" 150250 0
+ok "bins of the signal to noise" fom size? --bins SNR:5,20,100 -q -o size.cat
+near "250 objects of 10, 150 of 50" "$(col size.cat NPAIR1 | tr -d '\n')" 250150 0
 # object 7 leaves the bin in one image, object 9 is in it in one image only
 for k in 0 1 2 3 4 5 6 7 8; do awk -v k=$k '/^#/ { print; next } { s = $1 <= 300; if ($1 == 7 && k == 1) s = 0; if ($1 == 9 && k != 0) s = 0; if ($1 == 305 && k != 0) s = 1; $1 = s; print }' a$k >all$k; done
 fom all? -q --bins NUMBER:0.5,2 -o some.cat; fom all? -q --bins NUMBER:0.5,2 --bins-everywhere -o every.cat
