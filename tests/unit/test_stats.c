@@ -116,6 +116,16 @@ static void lines(void)
     check_close(&c, chi / M, 7, 5 * sqrt(14. / M));
     check_end(&c);
 
+    static const double at[4] = {0, 1, 2, 3}, value[4] = {0, 1, 2, 4};     /* residuals .2 -.1 -.4 .3 about -.2 + 1.3 x */
+    c = check_begin("four points without errors: theirs is the scatter, sqrt(0.3/2)");
+    check_close(&c, stats_line(4, at, value, NULL, &f), OK, 0.1);
+    check_close(&c, f.b, 1.3, 1e-14);
+    check_close(&c, f.a, -0.2, 1e-14);
+    check_close(&c, f.chi2, 0.3, 1e-14);
+    check_close(&c, f.se_b, sqrt(0.15 / 5), 1e-14);
+    check_close(&c, f.se_a, sqrt(0.15 * (1 / 4. + 1.5 * 1.5 / 5)), 1e-14);
+    check_end(&c);
+
     double x[3] = {1, 1, 1};
     check_that(stats_line(3, x, y, NULL, &f) == E_SINGULAR && isnan(f.b), "all-equal shears: no slope");
     check_that(stats_line(1, g, y, s, &f) == E_RANGE && isnan(f.b), "one point: no slope");
