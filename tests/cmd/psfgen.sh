@@ -154,6 +154,8 @@ END
     fails "a PSFEx model without a pixel scale" 1 psfgen --from model.psf -X 1 -Y 1 -o no.fits
     fails "a PSFEx model with another pixel" 1 psfgen --from model.psf --psf-scale 0.1 -X 1 -Y 1 --pixel 0.1 -o no.fits
     fails "a PSFEx model that contradicts itself" 1 psfgen --from broken.psf --psf-scale 0.1 -X 1 -Y 1 -o no.fits
+    sed "s/'2883E/'2883J/" model.psf >whole.psf      # the same bytes called whole numbers
+    fails "a PSFEx model of whole numbers" 1 psfgen --from whole.psf --psf-scale 0.1 -X 1 -Y 1 -o no.fits
     head -c 9000 model.psf >cut.psf
     fails "a PSFEx model cut short" 1 psfgen --from cut.psf --psf-scale 0.1 -X 1 -Y 1 -o no.fits
 fi
