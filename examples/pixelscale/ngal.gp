@@ -3,7 +3,7 @@
 load "style.gp"
 set xlabel theta_s
 set ylabel "galaxies / arcmin^{-2}"
-set yrange [0:430]
+set yrange [0:520]
 set xtics 0.08
 set xrange [0.02:0.30]
 set key font ",10" samplen 1.5
