@@ -4,6 +4,7 @@
 #include "opt.h"
 #include "shapecat.h"
 #include "tableio.h"
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -109,8 +110,6 @@ static void tell(const char *name, const struct cut_count *n, int only_where)
 static void keep_rows(struct table *t, const int64_t *bits, int mark)
 {
     if (mark) {
-        if (!table_find(t, "CUT"))
-            check(table_add(t, "CUT", COL_INT, "", "cuts failed, see cutcat(1)"), "CUT");
         int64_t *cut = table_ints(t, "CUT");
         if (!cut)
             die(EXIT_RUN, "column CUT is not of whole numbers");
@@ -126,13 +125,14 @@ static void keep_rows(struct table *t, const int64_t *bits, int mark)
     free(keep);
 }
 
-/* Keep the columns of a list "NAME,NAME..." and, when marked, CUT. */
-static void keep_columns(struct table *t, const char *list, int mark)
+/* What is written of t: the columns of a list "NAME,NAME..." and, when marked, CUT; NULL: all.  Columns are shared. */
+static void choose_columns(struct table *view, const struct table *t, const char *list, int mark)
 {
     unsigned char *keep = calloc(t->ncol + 1, 1);
-    if (!keep)
+    struct column *col = malloc((t->ncol + 1) * sizeof *col);
+    if (!keep || !col)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
-    for (const char *p = list; *p;) {
+    for (const char *p = list ? list : ""; *p;) {
         size_t len = strcspn(p, ","), k = 0;
         while (k < t->ncol && !(strlen(t->col[k].name) == len && memcmp(t->col[k].name, p, len) == 0))
             k++;
@@ -141,10 +141,67 @@ static void keep_columns(struct table *t, const char *list, int mark)
         keep[k] = 1;
         p += len + (p[len] == ',');
     }
+    free(view->col);
+    *view = *t;
+    view->col = col;
+    view->ncol = 0;
     for (size_t k = 0; k < t->ncol; k++)
-        keep[k] |= (unsigned char)(mark && strcmp(t->col[k].name, "CUT") == 0);
-    table_keep_columns(t, keep);
+        if (!list || keep[k] || (mark && strcmp(t->col[k].name, "CUT") == 0))
+            col[view->ncol++] = t->col[k];
     free(keep);
+}
+
+static void add_counts(struct cut_count *n, const struct cut_count *more)
+{
+    n->all += more->all;
+    n->stars += more->stars;
+    n->ellipticity += more->ellipticity;
+    n->size += more->size;
+    n->snr += more->snr;
+    n->where += more->where;
+}
+
+/* Cut the catalogue block by block into the spool (NULL: only count); t is its header. */
+static void cut_all(struct table_in *in, struct table *t, const struct cuts *c, const struct cut_where *where, const struct params *p,
+                    const char *name, struct row_spool *spool, struct cut_count *n)
+{
+    const size_t rows = table_block_rows(t);
+    int64_t *bits = malloc(rows * sizeof *bits);
+    struct table view = {0};
+    struct cut_count more;
+    struct err e;
+    if (!bits)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    do {
+        if (table_in_rows(in, t, rows, &e))
+            die(EXIT_RUN, "%s", e.text);
+        if (cuts_apply(t, c, p->where.n, where, bits, &more, &e))
+            die(EXIT_RUN, "%s: %s", name, e.text);
+        add_counts(n, &more);
+        if (!spool)
+            continue;
+        keep_rows(t, bits, p->mark);
+        choose_columns(&view, t, p->columns, p->mark);
+        int st = row_spool_add(spool, &view);
+        if (st)
+            die(EXIT_RUN, "%s: cannot spool: %s", name, st == E_IO ? strerror(errno) : err_text(st));
+    } while (more.all == rows);
+    free(view.col);
+    free(bits);
+}
+
+/* The header with the counts, and the rows that wait. */
+static void write_used(const struct table *t, struct row_spool *spool, const struct params *p, const struct common *c, const char *record)
+{
+    struct table head = {0};
+    struct table_rows *rows;
+    struct err e;
+    const char *inputs[] = {c->argv[0], p->stars};
+    choose_columns(&head, t, p->columns, p->mark);
+    check(row_spool_rows(spool, &head, &rows), c->out);
+    if (table_write_rows(&head, rows, c->out, record, inputs, p->stars ? 2 : 1, &e))
+        die(EXIT_RUN, "%s", e.text);
+    free(head.col);
 }
 
 int main(int argc, char **argv)
@@ -176,35 +233,33 @@ int main(int argc, char **argv)
 
     struct err e;
     struct table t = {0};
+    struct table_in *in;
+    struct row_spool *spool = NULL;
     struct starmom stars;
-    struct cut_count n;
+    struct cut_count n = {0};
     struct cut_where *where = parse_where(&p.where);
-    if (table_read(&t, c.argv[0], c.max_memory, &e))
+    if (table_in_open(&in, &t, c.argv[0], c.max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     cuts.locus_mag = p.locus[0];
     cuts.locus_width = p.locus[1];
     if (!cuts.only_where)
         find_dstar(&cuts, &stars, &p, &t, c.max_memory);
-    int64_t *bits = calloc(t.nrow + 1, sizeof *bits);
-    if (!bits)
-        die(EXIT_RUN, "%s", err_text(E_NOMEM));
-    if (cuts_apply(&t, &cuts, p.where.n, where, bits, &n, &e))
-        die(EXIT_RUN, "%s: %s", c.argv[0], e.text);
+    if (!c.check)
+        check(row_spool_open(&spool), c.argv[0]);
+    if (p.mark && !c.check && !table_find(&t, "CUT"))
+        check(table_add(&t, "CUT", COL_INT, "", "cuts failed, see cutcat(1)"), "CUT");
+    cut_all(in, &t, &cuts, where, &p, c.argv[0], spool, &n);
+    table_in_close(in);
     if (c.verbose || c.check)
         tell(c.argv[0], &n, cuts.only_where);
     if (!c.check) {
         if (!cuts.only_where)
             set_keywords(&t, &cuts, &n);
-        keep_rows(&t, bits, p.mark);
-        if (p.columns)
-            keep_columns(&t, p.columns, p.mark);
         char *record = opt_record(&prog, own, &c);
-        const char *inputs[] = {c.argv[0], p.stars};
-        if (table_write(&t, c.out, record, inputs, p.stars ? 2 : 1, &e))
-            die(EXIT_RUN, "%s", e.text);
+        write_used(&t, spool, &p, &c, record);
         free(record);
     }
-    free(bits);
+    row_spool_close(spool);
     free(where);
     table_free(&t);
     opt_free(own);

@@ -43,19 +43,23 @@ static void parse_bins(struct bins *b, const char *text)
     b->n = n - 1;
 }
 
-/* Read one catalogue at a time and keep what is needed. */
+/* Read the catalogues block by block and keep what is needed. */
 static struct fom_image *read_all(const struct common *c, const char *key, int psf)
 {
     struct err e;
     struct fom_image *im = calloc((size_t)c->argc + 1, sizeof *im);
     if (!im)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    double held = 0;
     for (int i = 0; i < c->argc; i++) {
         struct table t = {0};
-        if (table_read(&t, c->argv[i], c->max_memory, &e))
+        struct table_in *in;
+        if (table_in_open(&in, &t, c->argv[i], c->max_memory, &e))
             die(EXIT_RUN, "%s", e.text);
-        if (fom_image_read(&im[i], &t, key, &e))
-            die(EXIT_RUN, "%s: %s", c->argv[i], e.text);
+        if (fom_image_read(&im[i], in, &t, c->argv[i], key, c->max_memory - held, &e))
+            die(EXIT_RUN, "%s", e.text);
+        table_in_close(in);
+        held += (double)im[i].n * sizeof *im[i].object;
         if (psf && !(isfinite(im[i].epsf[0]) && isfinite(im[i].epsf[1])))
             die(EXIT_RUN, "%s: no keywords EPSF1 EPSF2: correct the shapes for a PSF with rrgshape", c->argv[i]);
         table_free(&t);

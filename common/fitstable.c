@@ -10,6 +10,7 @@
 #include "fitswalk.h"
 #include "imageio.h"
 #include "table.h"
+#include "tablerows.h"
 #include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
@@ -32,7 +33,8 @@ struct field {
     enum col_type type;
 };
 
-struct reader {
+/* The rows of one table, read from the first on. */
+struct fits_rows {
     struct fits_in *in;
     const struct fits_unit *u;
     int index;
@@ -40,10 +42,12 @@ struct reader {
     struct field *field;
     struct table *t;
     struct err *e;
+    uint64_t next;         /* first row that has not been read */
+    uint64_t used;         /* bytes of the heap that rows so far take */
 };
 
 __attribute__((format(printf, 3, 4)))
-static int bad(struct reader *r, const struct field *c, const char *fmt, ...)
+static int bad(struct fits_rows *r, const struct field *c, const char *fmt, ...)
 {
     char what[200];
     va_list ap;
@@ -54,7 +58,7 @@ static int bad(struct reader *r, const struct field *c, const char *fmt, ...)
                    c ? ": column " : "", c ? c->name : "", what);
 }
 
-static int no_memory(struct reader *r)
+static int no_memory(struct fits_rows *r)
 {
     return err_set(r->e, E_NOMEM, "%s: out of memory", source_name(r->in->src));
 }
@@ -74,7 +78,7 @@ static size_t item_size(char letter)
 }
 
 /* TFORM: [repeat]letter[...] */
-static int parse_form(struct reader *r, struct field *c, const char *form)
+static int parse_form(struct fits_rows *r, struct field *c, const char *form)
 {
     char *end;
     unsigned long repeat = 1;
@@ -112,7 +116,7 @@ static void plain_name(char *s)
 }
 
 /* Scaling and missing values: which type of the catalogue the column becomes. */
-static int parse_meaning(struct reader *r, struct field *c, size_t number)
+static int parse_meaning(struct fits_rows *r, struct field *c, size_t number)
 {
     const struct header *h = &r->u->cards;
     char key[32];
@@ -145,7 +149,7 @@ static int parse_meaning(struct reader *r, struct field *c, size_t number)
     return OK;
 }
 
-static int parse_fields(struct reader *r)
+static int parse_fields(struct fits_rows *r)
 {
     const struct header *h = &r->u->cards;
     long n;
@@ -221,7 +225,7 @@ static double stored_number(char letter, const unsigned char *p)
     return (double)stored_int(letter, p);
 }
 
-static int read_text(struct reader *r, const struct field *c, const unsigned char *p, size_t row, char **to)
+static int read_text(struct fits_rows *r, const struct field *c, const unsigned char *p, size_t row, char **to)
 {
     size_t n = strnlen((const char *)p, c->width);
     while (n && p[n - 1] == ' ')
@@ -237,7 +241,7 @@ static int read_text(struct reader *r, const struct field *c, const unsigned cha
     return OK;
 }
 
-static int read_int(struct reader *r, const struct field *c, const unsigned char *p, size_t row, int64_t *to)
+static int read_int(struct fits_rows *r, const struct field *c, const unsigned char *p, size_t row, int64_t *to)
 {
     int64_t v = stored_int(c->letter, p);
     if (c->letter == 'L') {
@@ -256,8 +260,8 @@ static int read_int(struct reader *r, const struct field *c, const unsigned char
     return OK;
 }
 
-static int read_ragged(struct reader *r, const struct field *c, struct column *to, const unsigned char *p,
-                       size_t row, uint64_t *used)
+static int read_ragged(struct fits_rows *r, const struct field *c, struct column *to, const unsigned char *p,
+                       size_t row)
 {
     size_t half = c->width / 2, size = item_size(c->item);
     uint64_t n = big_endian(p, half), at = big_endian(p + half, half);
@@ -270,8 +274,8 @@ static int read_ragged(struct reader *r, const struct field *c, struct column *t
     uint64_t room = r->u->data_size - heap;
     if (n > room / size || at > room - n * size)
         return bad(r, c, "row %zu points outside the heap", row + 1);
-    *used += n * size;
-    if (*used > room)
+    r->used += n * size;
+    if (r->used > room)
         return bad(r, c, "its rows share parts of the heap, which is not read");
 
     unsigned char *raw = malloc(n ? n * size : 1);
@@ -288,7 +292,7 @@ static int read_ragged(struct reader *r, const struct field *c, struct column *t
     return st;
 }
 
-static int read_cell(struct reader *r, size_t i, const unsigned char *p, size_t row, uint64_t *used)
+static int read_cell(struct fits_rows *r, size_t i, const unsigned char *p, size_t row)
 {
     const struct field *c = &r->field[i];
     struct column *to = &r->t->col[i];
@@ -297,7 +301,7 @@ static int read_cell(struct reader *r, size_t i, const unsigned char *p, size_t 
     if (to->type == COL_INT)
         return read_int(r, c, p, row, &to->v.i[row]);
     if (to->type == COL_RAGGED)
-        return read_ragged(r, c, to, p, row, used);
+        return read_ragged(r, c, to, p, row);
     if (strchr("LBIJK", c->letter)) {
         int64_t v = stored_int(c->letter, p);
         to->v.r[row] = c->has_null && v == c->null ? NAN : c->letter == 'L' ? v == 1 : c->zero + c->scale * (double)v;
@@ -308,23 +312,22 @@ static int read_cell(struct reader *r, size_t i, const unsigned char *p, size_t 
     return OK;
 }
 
-/* Visit all rows: with a table, fill it; without, look for missing whole numbers. */
-static int each_row(struct reader *r, int fill)
+/* Visit n rows from `from` on: fill those of the table from its row 0, or look for missing whole numbers. */
+static int each_row(struct fits_rows *r, uint64_t from, size_t n, int fill)
 {
-    size_t width = (size_t)r->u->axis[0], nrow = (size_t)r->u->axis[1];
+    size_t width = (size_t)r->u->axis[0];
     size_t rows = width < BLOCK ? BLOCK / width : 1;
     unsigned char *block = malloc(rows * width);
-    uint64_t used = 0;
     int st = block ? OK : no_memory(r);
-    for (size_t row = 0; row < nrow && !st; row += rows) {
-        size_t k = nrow - row < rows ? nrow - row : rows;
-        st = source_read(r->in->src, r->u->data_at + (uint64_t)row * width, block, k * width, r->e);
+    for (size_t row = 0; row < n && !st; row += rows) {
+        size_t k = n - row < rows ? n - row : rows;
+        st = source_read(r->in->src, r->u->data_at + (from + row) * width, block, k * width, r->e);
         for (size_t j = 0; j < k && !st; j++)
             for (size_t i = 0; i < r->n && !st; i++) {
                 struct field *c = &r->field[i];
                 const unsigned char *p = block + j * width + c->offset;
                 if (fill)
-                    st = read_cell(r, i, p, row + j, &used);
+                    st = read_cell(r, i, p, row + j);
                 else if (c->type == COL_INT && c->has_null)
                     c->missing |= stored_int(c->letter, p) == c->null;
             }
@@ -333,12 +336,21 @@ static int each_row(struct reader *r, int fill)
     return st;
 }
 
+/* Only a pass over all rows can tell whether a whole number is missing. */
+static int find_missing(struct fits_rows *r)
+{
+    int can = 0;
+    for (size_t i = 0; i < r->n; i++)
+        can |= r->field[i].type == COL_INT && r->field[i].has_null;
+    return can ? each_row(r, 0, (size_t)r->u->axis[1], 0) : OK;
+}
+
 /* ---- the whole table ---- */
 
-static int add_columns(struct reader *r)
+static int add_columns(struct fits_rows *r)
 {
     char key[32], unit[72], what[512];
-    int st = table_resize(r->t, (size_t)r->u->axis[1]);
+    int st = OK;
     for (size_t i = 0; i < r->n && !st; i++) {
         const struct field *c = &r->field[i];
         snprintf(key, sizeof key, "TUNIT%zu", i + 1);
@@ -370,7 +382,7 @@ static void bare_value(const char *card, char *to)
     to[n] = 0;
 }
 
-static int add_keyword(struct reader *r, const char *card)
+static int add_keyword(struct fits_rows *r, const char *card)
 {
     char name[81], value[2048];
     int long_name = !memcmp(card, "HIERARCH ", 9);
@@ -394,7 +406,7 @@ static int add_keyword(struct reader *r, const char *card)
     return table_set_text(r->t, name, value) ? no_memory(r) : OK;
 }
 
-static int add_header(struct reader *r)
+static int add_header(struct fits_rows *r)
 {
     static const char *const own[] = {"EXTNAME ", "EXTVER  ", "EXTLEVEL", "COMMENT ", "CONTINUE", "        "};
     int st = OK;
@@ -430,10 +442,11 @@ static int choose(const struct fits_in *f)
     return -1;
 }
 
-int fits_in_table(struct fits_in *f, struct table *t, struct err *e)
+int fits_table_open(struct fits_rows **out, struct fits_in *f, struct table *t, struct err *e)
 {
     struct table new = {0};
-    struct reader r = {.in = f, .index = choose(f), .t = &new, .e = e};
+    struct fits_rows r = {.in = f, .index = choose(f), .t = &new, .e = e};
+    *out = NULL;
     if (r.index < 0)
         return err_set(e, E_MISSING, "%s: has no binary table", source_name(f->src));
     r.u = &f->unit[r.index];
@@ -441,14 +454,53 @@ int fits_in_table(struct fits_in *f, struct table *t, struct err *e)
         return bad(&r, NULL, "is not a binary table");
     int st = parse_fields(&r);
     if (st == OK)
-        st = each_row(&r, 0);
+        st = find_missing(&r);
     if (st == OK)
         st = add_columns(&r);
     if (st == OK)
-        st = each_row(&r, 1);
-    if (st == OK)
         st = add_header(&r);
-    free(r.field);
+    struct fits_rows *kept = st ? NULL : malloc(sizeof *kept);
+    if (!st && !kept)
+        st = no_memory(&r);
+    if (st) {
+        free(r.field);
+        table_free(&new);
+        return st;
+    }
+    *kept = r;
+    *out = kept;
+    *t = new;
+    return OK;
+}
+
+int fits_table_rows(struct fits_rows *r, struct table *t, size_t n, struct err *e)
+{
+    uint64_t left = r->u->axis[1] - r->next;
+    n = n < left ? n : (size_t)left;
+    r->t = t;
+    r->e = e;
+    if (table_resize(t, 0) || table_resize(t, n))
+        return no_memory(r);
+    int st = each_row(r, r->next, n, 1);
+    r->next += n;
+    return st;
+}
+
+void fits_table_close(struct fits_rows *r)
+{
+    if (r)
+        free(r->field);
+    free(r);
+}
+
+int fits_in_table(struct fits_in *f, struct table *t, struct err *e)
+{
+    struct table new = {0};
+    struct fits_rows *r;
+    int st = fits_table_open(&r, f, &new, e);
+    if (st == OK)
+        st = fits_table_rows(r, &new, SIZE_MAX, e);
+    fits_table_close(r);
     if (st)
         table_free(&new);
     else
@@ -458,24 +510,14 @@ int fits_in_table(struct fits_in *f, struct table *t, struct err *e)
 
 /* ---- writing ---- */
 
-/* Bytes of a column in a row; longest: words, values of a ragged row. */
-static size_t column_width(const struct table *t, const struct column *c, int wide, size_t *longest)
+/* Bytes of a column in a row; longest: of its words. */
+static size_t column_width(const struct column *c, int wide, size_t longest)
 {
-    *longest = 1;
     if (c->type == COL_REAL32)
         return 4;
-    if (c->type == COL_RAGGED) {
-        for (size_t i = 0; i < t->nrow; i++)
-            if (c->start[i + 1] - c->start[i] > *longest)
-                *longest = c->start[i + 1] - c->start[i];
+    if (c->type == COL_RAGGED)
         return wide ? 16 : 8;
-    }
-    if (c->type != COL_TEXT)
-        return 8;
-    for (size_t i = 0; i < t->nrow; i++)
-        if (strlen(c->v.s[i]) > *longest)
-            *longest = strlen(c->v.s[i]);
-    return *longest;
+    return c->type == COL_TEXT ? longest : 8;
 }
 
 static const struct column *ragged_column(const struct table *t)
@@ -532,22 +574,19 @@ static int keyword_card(struct header *h, const struct keyword *k)
     return header_append(h, card);
 }
 
-static int table_cards(struct header *h, const struct table *t, const char *extname, size_t width,
-                       uint64_t heap, int wide, struct err *e)
+static int table_cards(struct header *h, const struct table *t, const struct table_rows *rows, const char *extname,
+                       size_t width, uint64_t heap, int wide, struct err *e)
 {
     const struct {
         const char *key;
         long value;
-    } fixed[] = {{"BITPIX", 8}, {"NAXIS", 2}, {"NAXIS1", (long)width}, {"NAXIS2", (long)t->nrow},
+    } fixed[] = {{"BITPIX", 8}, {"NAXIS", 2}, {"NAXIS1", (long)width}, {"NAXIS2", (long)rows->nrow},
                  {"PCOUNT", (long)heap}, {"GCOUNT", 1}, {"TFIELDS", (long)t->ncol}};
-    size_t longest;
     int st = header_set_str(h, "XTENSION", "BINTABLE", "binary table");
     for (size_t i = 0; i < sizeof fixed / sizeof *fixed && !st; i++)
         st = header_set_long(h, fixed[i].key, fixed[i].value, NULL);
-    for (size_t i = 0; i < t->ncol && !st; i++) {
-        column_width(t, &t->col[i], wide, &longest);
-        st = column_cards(h, &t->col[i], i + 1, longest, wide);
-    }
+    for (size_t i = 0; i < t->ncol && !st; i++)
+        st = column_cards(h, &t->col[i], i + 1, rows->longest[i], wide);
     if (st == OK && extname && *extname)
         st = header_set_str(h, "EXTNAME", extname, NULL);
     for (size_t i = 0; i < t->nkey && !st; i++) {
@@ -580,7 +619,8 @@ static void put_double(unsigned char *p, double d)
     put_big_endian(p, 8, v);
 }
 
-static void put_cell(unsigned char *p, const struct column *c, size_t row, size_t width)
+/* `heap`: values of the ragged column before this block. */
+static void put_cell(unsigned char *p, const struct column *c, size_t row, size_t width, uint64_t heap)
 {
     float f;
     uint32_t w;
@@ -604,25 +644,40 @@ static void put_cell(unsigned char *p, const struct column *c, size_t row, size_
         break;
     case COL_RAGGED:
         put_big_endian(p, width / 2, c->start[row + 1] - c->start[row]);
-        put_big_endian(p + width / 2, width / 2, (c->start[row] - c->start[0]) * sizeof(double));
+        put_big_endian(p + width / 2, width / 2, (heap + c->start[row] - c->start[0]) * sizeof(double));
         break;
     }
 }
 
-static int put_rows(struct fits_out *f, const struct table *t, const size_t *cell, size_t width, struct err *e)
+/* The rows of one block; *heap goes on by its ragged values. */
+static int put_block(struct fits_out *f, const struct table *t, const size_t *cell, unsigned char *buf, size_t rows, uint64_t *heap,
+                     struct err *e)
 {
-    size_t rows = width < BLOCK ? BLOCK / (width ? width : 1) : 1;
-    unsigned char *block = malloc(rows * width + 1);
-    int st = block ? OK : err_set(e, E_NOMEM, "out of memory");
+    int st = OK;
     for (size_t row = 0; row < t->nrow && !st; row += rows) {
         size_t k = t->nrow - row < rows ? t->nrow - row : rows;
-        unsigned char *p = block;
+        unsigned char *p = buf;
         for (size_t j = row; j < row + k; j++)
             for (size_t i = 0; i < t->ncol; p += cell[i++])
-                put_cell(p, &t->col[i], j, cell[i]);
-        st = fits_out_bytes(f, block, (size_t)(p - block), e);
+                put_cell(p, &t->col[i], j, cell[i], *heap);
+        st = fits_out_bytes(f, buf, (size_t)(p - buf), e);
     }
-    free(block);
+    const struct column *ragged = ragged_column(t);
+    *heap += ragged ? ragged->start[t->nrow] - ragged->start[0] : 0;
+    return st;
+}
+
+static int put_rows(struct fits_out *f, struct table_rows *r, const size_t *cell, size_t width, struct err *e)
+{
+    size_t rows = width < BLOCK ? BLOCK / (width ? width : 1) : 1;
+    unsigned char *buf = malloc(rows * width + 1);
+    const struct table *t;
+    uint64_t heap = 0;
+    int st = buf ? OK : err_set(e, E_NOMEM, "out of memory");
+    r->again(r);
+    while (!st && !(st = r->next(r, &t, e)) && t)
+        st = put_block(f, t, cell, buf, rows, &heap, e);
+    free(buf);
     return st;
 }
 
@@ -642,31 +697,50 @@ static int put_heap(struct fits_out *f, const struct column *c, size_t nrow, str
     return st;
 }
 
-int fits_out_table(struct fits_out *f, const struct table *t, const char *extname, struct err *e)
+static int put_heaps(struct fits_out *f, struct table_rows *r, struct err *e)
 {
-    const struct column *ragged = ragged_column(t);
+    const struct table *t;
+    int st = OK;
+    r->again(r);
+    while (!st && !(st = r->next(r, &t, e)) && t)
+        st = put_heap(f, ragged_column(t), t->nrow, e);
+    return st;
+}
+
+int fits_out_blocks(struct fits_out *f, const struct table *t, struct table_rows *rows, const char *extname, struct err *e)
+{
     if (t->ncol < 1 || t->ncol > MOST_FIELDS)
         return err_set(e, E_RANGE, "a FITS table has 1 to %d columns, not %zu", MOST_FIELDS, t->ncol);
-    uint64_t heap = ragged ? (ragged->start[t->nrow] - ragged->start[0]) * sizeof(double) : 0;
+    uint64_t heap = ragged_column(t) ? rows->values * sizeof(double) : 0;
     int wide = heap > INT32_MAX, st = OK;
-    size_t *cell = malloc(t->ncol * sizeof *cell), width = 0, longest;
+    size_t *cell = malloc(t->ncol * sizeof *cell), width = 0;
     if (!cell)
         return err_set(e, E_NOMEM, "out of memory");
     for (size_t i = 0; i < t->ncol; i++)
-        width += cell[i] = column_width(t, &t->col[i], wide, &longest);
+        width += cell[i] = column_width(&t->col[i], wide, rows->longest[i]);
 
     struct header h = {0};
     if (fits_out_count(f) == 0)
         st = fits_out_hdu(f, -32, 0, 0, 1, NULL, e);
     if (st == OK)
-        st = table_cards(&h, t, extname, width, heap, wide, e);
+        st = table_cards(&h, t, rows, extname, width, heap, wide, e);
     if (st == OK)
-        st = fits_out_begin(f, &h, (uint64_t)width * t->nrow + heap, e);
+        st = fits_out_begin(f, &h, (uint64_t)width * rows->nrow + heap, e);
     if (st == OK)
-        st = put_rows(f, t, cell, width, e);
+        st = put_rows(f, rows, cell, width, e);
     if (st == OK && heap)
-        st = put_heap(f, ragged, t->nrow, e);
+        st = put_heaps(f, rows, e);
     header_free(&h);
     free(cell);
+    return st;
+}
+
+int fits_out_table(struct fits_out *f, const struct table *t, const char *extname, struct err *e)
+{
+    struct table_whole whole;
+    if (table_whole_init(&whole, t))
+        return err_set(e, E_NOMEM, "out of memory");
+    int st = fits_out_blocks(f, t, &whole.rows, extname, e);
+    table_whole_free(&whole);
     return st;
 }

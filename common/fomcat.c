@@ -106,23 +106,86 @@ static int distances(struct fom_image *im)
     return OK;
 }
 
-static int read_keys(struct fom_image *im, const struct table *t, const char *key, struct err *e)
+/* The columns of one block, all that fom looks at. */
+struct used {
+    const struct column *shape[6], *x, *y, *cut, *key[2];
+    double px, key_px;        /* factors of positions and of the key */
+    int ratio;                /* the key is key[0]/key[1] */
+};
+
+static int need(const struct table *t, const char *name, const char *why, const struct column **c, struct err *e)
 {
-    if (strcmp(key, "DISTANCE") == 0)
-        return distances(im) ? err_set(e, E_NOMEM, "%s", err_text(E_NOMEM)) : OK;
-    int own = table_find(t, key) != NULL, snr = !own && strcmp(key, "SNR") == 0, size = !own && strcmp(key, "SIZE") == 0;
-    const char *name[2] = {snr ? "FLUX_AUTO" : size ? "D_RRG" : key, snr ? "FLUXERR_AUTO" : size ? "D_RRG" : key};
-    const struct column *c[2];
-    double px = 1;
-    for (int k = 0; k < 2; k++) {
-        c[k] = table_find(t, name[k]);
-        if (!c[k] || c[k]->type == COL_TEXT || c[k]->type == COL_RAGGED)
-            return err_set(e, E_MISSING, "no column of numbers %s for the bins", name[k]);
-    }
-    if (size && table_key_number(t, "PIXSCALE", &px) != OK)
+    *c = table_find(t, name);
+    if (!*c || (*c)->type == COL_TEXT || (*c)->type == COL_RAGGED)
+        return err_set(e, E_MISSING, "no column of numbers %s%s", name, why);
+    return OK;
+}
+
+static int find_key(struct used *u, const struct table *t, const char *key, struct err *e)
+{
+    int own = table_find(t, key) != NULL, size = !own && strcmp(key, "SIZE") == 0;
+    u->ratio = !own && strcmp(key, "SNR") == 0;
+    int st = need(t, u->ratio ? "FLUX_AUTO" : size ? "D_RRG" : key, " for the bins", &u->key[0], e);
+    if (st == OK && u->ratio)
+        st = need(t, "FLUXERR_AUTO", " for the bins", &u->key[1], e);
+    u->key_px = 1;
+    if (st == OK && size && table_key_number(t, "PIXSCALE", &u->key_px) != OK)
         return err_set(e, E_MISSING, "no keyword PIXSCALE for bins of SIZE");
-    for (size_t i = 0; i < im->n; i++)
-        im->object[i].key = snr ? table_number(c[0], i) / table_number(c[1], i) : table_number(c[0], i) * px;
+    return st;
+}
+
+static int find_columns(struct used *u, int *on_sky, const struct table *t, const char *key, struct err *e)
+{
+    static const char *const name[] = {"E1", "E2", "E1ERR", "E2ERR", "P11", "P22"};
+    *u = (struct used){.px = 1};
+    for (int k = 0; k < 6; k++) {
+        u->shape[k] = table_find(t, name[k]);
+        if (!u->shape[k])
+            return err_set(e, E_MISSING, "no column %s: measure shapes with rrgshape first", name[k]);
+    }
+    const struct column *ra = table_find(t, "ALPHA_J2000"), *dec = table_find(t, "DELTA_J2000");
+    *on_sky = ra && dec;
+    u->x = *on_sky ? ra : table_find(t, "X_IMAGE");
+    u->y = *on_sky ? dec : table_find(t, "Y_IMAGE");
+    if (!u->x || !u->y)
+        return err_set(e, E_MISSING, "no positions: columns ALPHA_J2000 DELTA_J2000 or X_IMAGE Y_IMAGE");
+    if (!*on_sky && table_key_number(t, "PIXSCALE", &u->px) != OK)
+        return err_set(e, E_MISSING, "no keyword PIXSCALE and no sky positions");
+    u->cut = table_find(t, "CUT");
+    return key && strcmp(key, "DISTANCE") != 0 ? find_key(u, t, key, e) : OK;
+}
+
+static struct fom_object object_at(const struct used *u, size_t i)
+{
+    struct fom_object o = {
+        .x = table_number(u->x, i) * u->px, .y = table_number(u->y, i) * u->px,
+        .e = {table_number(u->shape[0], i), table_number(u->shape[1], i)},
+        .err = {table_number(u->shape[2], i), table_number(u->shape[3], i)},
+        .p = {table_number(u->shape[4], i), table_number(u->shape[5], i)}, .listed = 1, .key = NAN};
+    int good = isfinite(o.e[0]) && isfinite(o.e[1]) && isfinite(o.p[0]) && isfinite(o.p[1]);
+    o.measured = good && hypot(o.e[0], o.e[1]) < 2;
+    o.used = o.passes = good && (!u->cut || table_number(u->cut, i) == 0);
+    if (u->key[0])
+        o.key = u->ratio ? table_number(u->key[0], i) / table_number(u->key[1], i) : table_number(u->key[0], i) * u->key_px;
+    return o;
+}
+
+/* The rows of t behind the objects of im, which have room for *cap. */
+static int add_rows(struct fom_image *im, size_t *cap, const struct table *t, const struct used *u, double max_memory, struct err *e)
+{
+    if (im->n + t->nrow > *cap || !im->object) {
+        size_t room = im->n + t->nrow + im->n / 4 + 1;
+        if ((double)room * sizeof *im->object > max_memory)
+            return err_set(e, E_NOMEM, "needs more than --max-memory");
+        struct fom_object *o = realloc(im->object, room * sizeof *o);
+        if (!o)
+            return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
+        im->object = o;
+        *cap = room;
+    }
+    for (size_t i = 0; i < t->nrow; i++)
+        im->object[im->n + i] = object_at(u, i);
+    im->n += t->nrow;
     return OK;
 }
 
@@ -135,45 +198,36 @@ void fom_image_bin(struct fom_image *im, double lo, double hi)
     }
 }
 
-int fom_image_read(struct fom_image *im, const struct table *t, const char *key, struct err *e)
+/* The message of e with the name of the catalogue before it. */
+static int about(const char *name, int st, struct err *e)
 {
-    static const char *const need[] = {"E1", "E2", "E1ERR", "E2ERR", "P11", "P22"};
-    const struct column *c[6];
-    struct fom_image r = {.n = t->nrow};
-    for (int k = 0; k < 6; k++) {
-        c[k] = table_find(t, need[k]);
-        if (!c[k])
-            return err_set(e, E_MISSING, "no column %s: measure shapes with rrgshape first", need[k]);
-    }
+    if (!e)
+        return st;
+    const struct err cause = *e;
+    return err_set(e, st, "%s: %s", name, cause.text);
+}
+
+int fom_image_read(struct fom_image *im, struct table_in *in, struct table *t, const char *name, const char *key, double max_memory,
+                   struct err *e)
+{
+    struct fom_image r = {0};
+    struct used u;
+    size_t cap = 0, rows = table_block_rows(t);
     int st = read_keywords(&r, t, e);
     if (st)
-        return st;
-    const struct column *ra = table_find(t, "ALPHA_J2000"), *dec = table_find(t, "DELTA_J2000"), *cut = table_find(t, "CUT");
-    const struct column *x = table_find(t, "X_IMAGE"), *y = table_find(t, "Y_IMAGE");
-    r.on_sky = ra && dec;
-    if (!r.on_sky && !(x && y))
-        return err_set(e, E_MISSING, "no positions: columns ALPHA_J2000 DELTA_J2000 or X_IMAGE Y_IMAGE");
-    double px = 1;
-    if (!r.on_sky && table_key_number(t, "PIXSCALE", &px) != OK)
-        return err_set(e, E_MISSING, "no keyword PIXSCALE and no sky positions");
-    r.marked = cut != NULL;
-    r.object = calloc(t->nrow + 1, sizeof *r.object);
-    if (!r.object)
-        return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
-    for (size_t i = 0; i < t->nrow; i++) {
-        struct fom_object *o = &r.object[i];
-        *o = (struct fom_object){
-            .x = r.on_sky ? table_number(ra, i) : table_number(x, i) * px,
-            .y = r.on_sky ? table_number(dec, i) : table_number(y, i) * px,
-            .e = {table_number(c[0], i), table_number(c[1], i)}, .err = {table_number(c[2], i), table_number(c[3], i)},
-            .p = {table_number(c[4], i), table_number(c[5], i)}};
-        int good = isfinite(o->e[0]) && isfinite(o->e[1]) && isfinite(o->p[0]) && isfinite(o->p[1]);
-        o->measured = good && hypot(o->e[0], o->e[1]) < 2;
-        o->used = o->passes = good && (!cut || table_number(cut, i) == 0);
-        o->listed = 1;
-        o->key = NAN;
-    }
-    st = key ? read_keys(&r, t, key, e) : OK;
+        return about(name, st, e);
+    r.marked = table_find(t, "CUT") != NULL;
+    do {
+        if (in && (st = table_in_rows(in, t, rows, e)))
+            break;
+        st = find_columns(&u, &r.on_sky, t, key, e);
+        if (st == OK)
+            st = add_rows(&r, &cap, t, &u, max_memory, e);
+        if (st)
+            about(name, st, e);
+    } while (in && st == OK && t->nrow == rows);
+    if (st == OK && key && strcmp(key, "DISTANCE") == 0 && distances(&r))
+        st = err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
     if (st)
         fom_image_free(&r);
     else

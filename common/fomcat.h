@@ -7,6 +7,7 @@
 
 #include "err.h"
 #include "table.h"
+#include "tableio.h"
 #include <stddef.h>
 
 struct fom_object {
@@ -36,12 +37,13 @@ struct fom_image {
 };
 
 /*
- * What fom needs of one catalogue; all objects listed.  key: a column of
+ * What fom needs of one catalogue, read to its end with t as its header and block (in NULL: all of t); all objects listed.  `name` is for messages; the objects take at most max_memory bytes.  key: a column of
  * numbers, or SNR (FLUX_AUTO/FLUXERR_AUTO), SIZE (D_RRG in arcsec), DISTANCE (arcsec to the nearest
  * other row of the catalogue); NULL: none.  E_MISSING: e names the column or
  * keyword.  Free with fom_image_free.
  */
-MUST_CHECK int fom_image_read(struct fom_image *im, const struct table *t, const char *key, struct err *e);
+MUST_CHECK int fom_image_read(struct fom_image *im, struct table_in *in, struct table *t, const char *name, const char *key,
+                              double max_memory, struct err *e);
 
 /* List the objects with lo <= key < hi. */
 void fom_image_bin(struct fom_image *im, double lo, double hi);

@@ -115,12 +115,21 @@ MUST_CHECK int image_write(const struct image *im, const char *name, const char 
 /* ---- binary tables (used by tableio for names that end in .fits) ---- */
 
 struct table;
+struct table_rows;
 /* First binary table of an open file (or the one the suffix selects). */
 MUST_CHECK int fits_in_table(struct fits_in *f, struct table *t, struct err *e);
+/* The same in blocks: the header, then the next n rows at most (none at the end) in place of those of t. */
+struct fits_rows;
+MUST_CHECK int fits_table_open(struct fits_rows **r, struct fits_in *f, struct table *t, struct err *e);
+MUST_CHECK int fits_table_rows(struct fits_rows *r, struct table *t, size_t n, struct err *e);
+void fits_table_close(struct fits_rows *r);
 /* The array (of E or D) in the first row of a column of the binary table `index`; *v is allocated. */
 MUST_CHECK int fits_in_cell(struct fits_in *f, int index, const char *column, double **v, size_t *count,
                             struct err *e);
 MUST_CHECK int fits_out_table(struct fits_out *f, const struct table *t, const char *extname,
                               struct err *e);
+/* The same with the rows of `rows`; t knows the columns, keywords and HISTORY. */
+MUST_CHECK int fits_out_blocks(struct fits_out *f, const struct table *t, struct table_rows *rows, const char *extname,
+                               struct err *e);
 
 #endif

@@ -183,8 +183,7 @@ static int make_hidden(struct outfile *o)
     return take_name(o, -1);
 }
 
-/* An unlinked file in $TMPDIR or /tmp for what does not fit in memory. */
-static int make_spool(void)
+int outfile_spool(void)
 {
     const char *folder = getenv("TMPDIR");
     if (!folder || !*folder)
@@ -330,7 +329,7 @@ static int failed(struct outfile *o, int status)
 /* Move the buffer to the file. */
 static int flush(struct outfile *o)
 {
-    if (o->fd < 0 && (o->fd = make_spool()) < 0)
+    if (o->fd < 0 && (o->fd = outfile_spool()) < 0)
         return failed(o, E_IO);
     if (file_pwrite(o->fd, o->buf, o->n, o->base))
         return failed(o, E_IO);

@@ -60,6 +60,9 @@ uint64_t outfile_size(const struct outfile *o);
 /* Make the file appear; frees o whatever happens. e tells the cause. */
 MUST_CHECK int outfile_commit(struct outfile *o, struct err *e);
 
+/* Descriptor of a file without a name in $TMPDIR or /tmp, for what does not fit in memory; -1 and errno. */
+int outfile_spool(void);
+
 /* Give up: leave nothing behind. o may be NULL. */
 void outfile_abandon(struct outfile *o);
 

@@ -10,6 +10,7 @@
 #include "table.h"
 #include "decimal.h"
 #include <assert.h>
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -121,6 +122,11 @@ int table_scan_real(const char *text, size_t len, double *value)
         return scan_library(text, len, value);
     *value = minus ? -v : v;
     return OK;
+}
+
+double table_as_float(double v)
+{
+    return fabs(v) <= (double)FLT_MAX ? (double)(float)v : v;
 }
 
 size_t table_print_int(char *to, int64_t x)

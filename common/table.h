@@ -104,6 +104,9 @@ MUST_CHECK int table_scan_real(const char *text, size_t len, double *value);
 /* [+-] digits; E_DATA, or E_RANGE beyond int64. */
 MUST_CHECK int table_scan_int(const char *text, size_t len, int64_t *value);
 
+/* Rounded as a FITS table holds a COL_REAL32, so that both forms give the same number. */
+double table_as_float(double v);
+
 #define TABLE_PRINT 32     /* room for any printed number */
 
 /*

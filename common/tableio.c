@@ -1,19 +1,16 @@
 /*
- * tableio.c - catalogues as text or FITS, in and out.
+ * tableio.c - catalogues as text or FITS, read; tablewrite.c writes them.
  *
- * Text is read through one growing buffer, a line at a time, without copying
- * cells.  When the header gives the type of every column the buffer is reused;
- * otherwise the rows stay in memory and are read twice, first to find out
- * which columns are whole numbers, numbers or words.
+ * Text is read through one buffer, a line at a time, without copying cells.
+ * When the header does not give the type of every column the rows are read
+ * twice, first to find out which columns are whole numbers, numbers or words;
+ * those of a pipe stay in the buffer in between.
  */
 #include "tableio.h"
 #include "fileio.h"
 #include "imageio.h"
-#include "outfile.h"
 #include "source.h"
 #include <errno.h>
-#include <float.h>
-#include <math.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -39,12 +36,6 @@ struct lines {
     double held;             /* bytes held by the table */
     struct err *e;
 };
-
-/* Rounded as a FITS table would hold it, so that both forms give the same number. */
-static double as_float(double v)
-{
-    return fabs(v) <= (double)FLT_MAX ? (double)(float)v : v;
-}
 
 /* Up to n more bytes of the input; 0 at its end, -1 on failure. */
 static ssize_t more_bytes(struct lines *s, char *to, size_t n)
@@ -434,6 +425,7 @@ static int labels_join(struct lines *s, struct labels *h)
 struct rows {
     struct lines *s;
     struct table *t;
+    size_t ncol;             /* columns of the file; the table may have more behind them */
     double *ragged;          /* cells of one ragged row */
     size_t ragged_cap;
 };
@@ -509,7 +501,7 @@ static int scan_real(const char *p, size_t n, enum col_type type, double *v)
 {
     const int st = table_scan_real(p, n, v);
     if (st == OK && type == COL_REAL32)
-        *v = as_float(*v);
+        *v = table_as_float(*v);
     return st;
 }
 
@@ -525,7 +517,7 @@ static int parse_row(struct rows *r, const char *p, const char *end)
     }
     if (table_resize(t, row + 1))
         return no_memory(r->s);
-    for (i = 0; i < t->ncol; i++, p += n) {
+    for (i = 0; i < r->ncol; i++, p += n) {
         struct column *c = &t->col[i];
         if (c->type == COL_RAGGED)
             return parse_ragged(r, c, row, p, end);
@@ -589,11 +581,6 @@ static int each_row(struct lines *s, const struct table *t, char *line, size_t l
     return st;
 }
 
-static int each_parse(void *ctx, const char *p, const char *end)
-{
-    return parse_row(ctx, p, end);
-}
-
 /* ---- types from the cells ---- */
 
 struct guess {
@@ -625,16 +612,36 @@ static int each_guess(void *ctx, const char *p, const char *end)
     return OK;
 }
 
-/* Find the types of untyped columns from all rows; s is left where it was. */
-static int guess_types(struct lines *s, struct labels *h, const struct table *t, int ragged, char *line, size_t len)
+/* Where in the file the byte at `from` of the buffer is; -1 where the file cannot be read again from there. */
+static off_t place_in_file(const struct lines *s, const char *from)
+{
+    const off_t read = s->gzip ? -1 : lseek(s->fd, 0, SEEK_CUR);
+    return read < 0 ? -1 : read - (off_t)(s->end - (size_t)(from - s->buf));
+}
+
+/* Read on at `place`, which is before line `line`. */
+static int read_again(struct lines *s, off_t place, long line)
+{
+    if (lseek(s->fd, place, SEEK_SET) < 0)
+        return err_set(s->e, E_IO, "%s: %s", s->name, strerror(errno));
+    s->begin = s->end = 0;
+    s->eof = 0;
+    s->line = line - 1;
+    return OK;
+}
+
+/* Find the types of untyped columns from all rows; *line is the first row before and after. */
+static int guess_types(struct lines *s, struct labels *h, const struct table *t, int ragged, char **line, size_t *len)
 {
     struct guess g = {.s = s, .h = h, .ragged = ragged};
     g.col = calloc(h->n, sizeof *g.col);
     g.word = calloc(h->n, sizeof *g.word);
-    size_t offset = (size_t)(line - s->buf), behind = s->begin;
+    size_t offset = (size_t)(*line - s->buf), behind = s->begin;
     long first = s->line;
-    s->keep = offset;
-    int st = g.col && g.word ? each_row(s, t, line, len, each_guess, &g) : no_memory(s);
+    const off_t place = place_in_file(s, *line);
+    if (place < 0)
+        s->keep = offset;            /* a pipe: the rows stay in the buffer */
+    int st = g.col && g.word ? each_row(s, t, *line, *len, each_guess, &g) : no_memory(s);
     for (size_t i = 0; i < h->n && !st; i++) {
         if (h->col[i].type != UNTYPED)
             continue;
@@ -644,12 +651,19 @@ static int guess_types(struct lines *s, struct labels *h, const struct table *t,
         }
         h->col[i].type = g.col[i].word ? COL_TEXT : g.col[i].real ? COL_REAL : COL_INT;
     }
+    free(g.col);
+    free(g.word);
+    if (st)
+        return st;
+    if (place >= 0) {
+        st = read_again(s, place, first);
+        return st ? st : lines_next(s, line, len);
+    }
     /* the buffer may have moved its first byte; bytes from keep on are all there */
     s->begin = s->keep + (behind - offset);
     s->line = first;
-    free(g.col);
-    free(g.word);
-    return st;
+    *line = s->buf + s->keep;
+    return OK;
 }
 
 /* ---- reading ---- */
@@ -685,13 +699,22 @@ static int read_header(struct lines *s, struct labels *h, struct table *t, char 
     }
 }
 
-static int read_text(struct lines *s, struct table *t)
-{
-    struct labels h = {0};
-    char *line;
+struct table_in {
+    struct lines s;
+    struct rows r;
+    char *line;              /* of text: the next row, NULL at the end */
     size_t len;
-    int st = read_header(s, &h, t, &line, &len);
-    if (!st && !line && s->line == 0)
+    struct fits_in *fits;    /* instead of lines */
+    struct fits_rows *rows;
+};
+
+/* The header of a text, up to its first row. */
+static int open_text(struct table_in *in, struct table *t)
+{
+    struct lines *s = &in->s;
+    struct labels h = {0};
+    int st = read_header(s, &h, t, &in->line, &in->len);
+    if (!st && !in->line && s->line == 0)
         st = err_set(s->e, E_DATA, "%s: the file is empty", s->name);
     if (!st)
         st = labels_join(s, &h);
@@ -702,32 +725,34 @@ static int read_text(struct lines *s, struct table *t)
     int ragged = h.n && strcmp(h.col[h.n - 1].name, "COEFFS") == 0, open = 0;
     for (size_t i = 0; i < h.n; i++)
         open |= h.col[i].type == UNTYPED && !(ragged && i + 1 == h.n);
-    if (open && line) {
+    if (open && in->line) {
         struct table names = {0};
         st = add_columns(s, &h, &names, ragged);
         if (!st)
-            st = guess_types(s, &h, &names, ragged, line, len);
-        line = st ? NULL : s->buf + s->keep;
+            st = guess_types(s, &h, &names, ragged, &in->line, &in->len);
+        if (st)
+            in->line = NULL;
         table_free(&names);
     }
     if (!st)
         st = add_columns(s, &h, t, ragged);
-    struct rows r = {.s = s, .t = t};
-    if (!st)
-        st = each_row(s, t, line, len, each_parse, &r);
-    free(r.ragged);
+    in->r = (struct rows){.s = s, .ncol = t->ncol};
     labels_free(&h);
     return st;
 }
 
-static int read_fits(struct table *t, const char *name, double max_memory, struct err *e)
+/* Up to n more rows of a text behind those of t. */
+static int text_rows(struct table_in *in, struct table *t, size_t n)
 {
-    struct fits_in *f;
-    int st = fits_in_open(&f, name, max_memory, e);
-    if (st)
-        return st;
-    st = fits_in_table(f, t, e);
-    fits_in_close(f);
+    int st = OK;
+    in->r.t = t;
+    while (in->line && !st && t->nrow < n) {
+        const char *p = in->line, *end = in->line + in->len;
+        if (next_word(&p, end))
+            st = *p == '#' ? check_comment(&in->s, t, p + 1, end) : parse_row(&in->r, p, end);
+        if (!st)
+            st = lines_next(&in->s, &in->line, &in->len);
+    }
     return st;
 }
 
@@ -739,312 +764,117 @@ static int has_suffix_only(const char *name)
 }
 
 /* An input that is FITS or gzip of anything: a FITS table, or text. */
-static int read_source(struct lines *s, struct table *t, struct source *src)
+static int open_source(struct table_in *in, struct table *t, struct source *src)
 {
     unsigned char first = 0;
     uint64_t have;
-    int st = source_need(src, 1, &have, s->e);
+    int st = source_need(src, 1, &have, in->s.e);
     if (!st && have)
-        st = source_read(src, 0, &first, 1, s->e);
+        st = source_read(src, 0, &first, 1, in->s.e);
     if (!st && first == 'S') {
-        struct fits_in *f;
-        st = fits_in_from(&f, src, s->max_memory, s->e);
-        if (!st) {
-            st = fits_in_table(f, t, s->e);
-            fits_in_close(f);
-        }
-        return st;
+        st = fits_in_from(&in->fits, src, in->s.max_memory, in->s.e);
+        return st ? st : fits_table_open(&in->rows, in->fits, t, in->s.e);
     }
-    s->gzip = src;
-    s->begin = s->end = 0;
-    s->eof = 0;
-    if (!st)
-        st = read_text(s, t);
-    source_close(src);
-    return st;
+    in->s.gzip = src;
+    in->s.begin = in->s.end = 0;
+    in->s.eof = 0;
+    return st ? st : open_text(in, t);
 }
 
 /* What the first bytes, which are in the buffer, announce. */
-static int read_any(struct lines *s, struct table *t, const char *name)
+static int open_any(struct table_in *in, struct table *t, const char *name)
 {
+    struct lines *s = &in->s;
     int gzip = s->end >= 2 && s->buf[0] == '\x1f' && s->buf[1] == '\x8b', fits = s->end >= 1 && s->buf[0] == 'S', st;
     struct source *src;
     if (!gzip && !fits)
-        return read_text(s, t);
+        return open_text(in, t);
     if (strcmp(name, "-") == 0 && lseek(0, -(off_t)s->end, SEEK_CUR) < 0)
         st = source_open_begun(&src, s->buf, s->end, s->max_memory, s->e);
     else
         st = source_open(&src, name, s->max_memory, s->e);
-    return st ? st : read_source(s, t, src);
+    return st ? st : open_source(in, t, src);
+}
+
+int table_in_open(struct table_in **out, struct table *t, const char *name, double max_memory, struct err *e)
+{
+    struct table got = {0};
+    int standard = strcmp(name, "-") == 0, st;
+    *out = NULL;
+    if (name[0] == '\0')
+        return err_set(e, E_MISSING, "an empty file name");
+    struct table_in *in = calloc(1, sizeof *in);
+    if (!in)
+        return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
+    in->s = (struct lines){.fd = -1, .name = standard ? "standard input" : name, .keep = SIZE_MAX, .max_memory = max_memory, .e = e};
+    if (!standard && has_suffix_only(name)) {
+        st = fits_in_open(&in->fits, name, max_memory, e);
+        if (!st)
+            st = fits_table_open(&in->rows, in->fits, &got, e);
+    } else if ((in->s.fd = standard ? STDIN_FILENO : file_open(name, O_RDONLY, 0)) < 0) {
+        st = err_set(e, E_IO, "%s: %s", name, strerror(errno));
+    } else {
+        st = lines_fill(&in->s);
+        if (!st)
+            st = open_any(in, &got, name);
+    }
+    if (st) {
+        table_in_close(in);
+        table_free(&got);
+        return st;
+    }
+    *out = in;
+    *t = got;
+    return OK;
+}
+
+int table_in_rows(struct table_in *in, struct table *t, size_t n, struct err *e)
+{
+    if (in->fits)
+        return fits_table_rows(in->rows, t, n, e);
+    in->s.e = e;
+    in->s.held = 0;                 /* of the block before nothing stays */
+    if (table_resize(t, 0))
+        return no_memory(&in->s);
+    return text_rows(in, t, n);
+}
+
+void table_in_close(struct table_in *in)
+{
+    if (!in)
+        return;
+    fits_table_close(in->rows);
+    if (in->fits)
+        fits_in_close(in->fits);
+    if (in->s.gzip)
+        source_close(in->s.gzip);
+    if (in->s.fd > STDIN_FILENO)
+        close(in->s.fd);
+    free(in->r.ragged);
+    free(in->s.buf);
+    free(in);
+}
+
+size_t table_block_rows(const struct table *t)
+{
+    size_t width = 8 * (t->ncol + 1), rows;
+    if (t->ncol && t->col[t->ncol - 1].type == COL_RAGGED)
+        width += 8 * CELLS_MAX;
+    rows = ((size_t)1 << 20) / width;
+    return rows > 64 ? rows : 64;
 }
 
 int table_read(struct table *t, const char *name, double max_memory, struct err *e)
 {
     struct table got = {0};
-    int in = strcmp(name, "-") == 0;
-    struct lines s = {.fd = 0, .name = in ? "standard input" : name, .keep = SIZE_MAX, .max_memory = max_memory, .e = e};
-    if (name[0] == '\0')
-        return err_set(e, E_MISSING, "an empty file name");
-    if (!in && has_suffix_only(name))
-        return read_fits(t, name, max_memory, e);
-    if (!in && (s.fd = file_open(name, O_RDONLY, 0)) < 0)
-        return err_set(e, E_IO, "%s: %s", name, strerror(errno));
-    int st = lines_fill(&s);
+    struct table_in *in;
+    int st = table_in_open(&in, &got, name, max_memory, e);
     if (!st)
-        st = read_any(&s, &got, name);
-    if (!in)
-        close(s.fd);
-    free(s.buf);
+        st = table_in_rows(in, &got, SIZE_MAX, e);
+    table_in_close(in);
     if (st)
         table_free(&got);
     else
         *t = got;
     return st;
-}
-
-/* ---- writing ---- */
-
-struct sink {
-    struct outfile *o;
-    char *buf;
-    size_t n;
-    int st;                  /* first failure */
-};
-
-enum { SINK = 1 << 16 };
-
-static void sink_flush(struct sink *k)
-{
-    if (!k->st)
-        k->st = outfile_write(k->o, k->buf, k->n);
-    k->n = 0;
-}
-
-static void put(struct sink *k, const char *text, size_t n)
-{
-    while (n) {
-        if (k->n == SINK)
-            sink_flush(k);
-        size_t part = n < SINK - k->n ? n : SINK - k->n;
-        memcpy(k->buf + k->n, text, part);
-        k->n += part;
-        text += part;
-        n -= part;
-    }
-}
-
-static void put_text(struct sink *k, const char *text)
-{
-    put(k, text, strlen(text));
-}
-
-/* Text of a header line: control characters would end or hide it. */
-static void put_safe(struct sink *k, const char *text)
-{
-    for (; *text; text++)
-        put(k, (unsigned char)*text < 32 || *text == 127 ? "?" : text, 1);
-}
-
-/* A unit or a description: in a header, brackets surround the unit and a comma ends it. */
-static void put_plain(struct sink *k, const char *text, int unit)
-{
-    for (; *text; text++)
-        if (*text == '[' || *text == ']')
-            put(k, *text == '[' ? "(" : ")", 1);
-        else if (unit && *text == ',')
-            put(k, ";", 1);
-        else
-            put(k, (unsigned char)*text < 32 || *text == 127 ? "?" : text, 1);
-}
-
-static void put_padded(struct sink *k, const char *text, size_t width)
-{
-    size_t n = strlen(text);
-    put(k, text, n);
-    for (; n < width; n++)
-        put(k, " ", 1);
-}
-
-/* A number in a cell, printed into the buffer itself. */
-static void put_number(struct sink *k, enum col_type type, const struct column *c, size_t i)
-{
-    if (SINK - k->n < TABLE_PRINT)
-        sink_flush(k);
-    char *to = k->buf + k->n;
-    k->n += type == COL_INT ? table_print_int(to, c->v.i[i])
-          : type == COL_REAL32 ? table_print_real32(to, as_float(c->v.r[i])) : table_print_real(to, c->v.r[i]);
-}
-
-static void put_names(struct sink *k, const struct table *t)
-{
-    put_text(k, "#");
-    for (size_t i = 0; i < t->ncol; i++) {
-        put_text(k, " ");
-        put_text(k, t->col[i].name);
-    }
-    put_text(k, "\n");
-}
-
-/* Type as gnuastro spells it; words need their longest length. */
-static void put_type(struct sink *k, const struct column *c, size_t nrow)
-{
-    static const char *const tag[] = {[COL_INT] = "i64", [COL_REAL] = "f64", [COL_REAL32] = "f32", [COL_RAGGED] = "f64"};
-    if (c->type != COL_TEXT) {
-        put_text(k, tag[c->type]);
-        return;
-    }
-    size_t longest = 1;
-    for (size_t i = 0; i < nrow; i++)
-        longest = strlen(c->v.s[i]) > longest ? strlen(c->v.s[i]) : longest;
-    char s[32];
-    snprintf(s, sizeof s, "str%zu", longest);
-    put_text(k, s);
-}
-
-static void put_header(struct sink *k, const struct table *t, const char *record)
-{
-    char s[64];
-    size_t width = 8;
-    for (size_t i = 0; i < t->ncol; i++)
-        width = strlen(t->col[i].name) > width ? strlen(t->col[i].name) : width;
-    put_names(k, t);
-    for (size_t i = 0; i < t->ncol; i++) {
-        const struct column *c = &t->col[i];
-        snprintf(s, sizeof s, "# %3zu ", i + 1);
-        put_text(k, s);
-        put_padded(k, c->name, width + 1);
-        put_plain(k, c->what[0] ? c->what : "no description", 0);
-        if (c->unit[0]) {
-            put_text(k, " [");
-            put_plain(k, c->unit, 1);
-            put_text(k, "]");
-        }
-        put_text(k, "\n");
-    }
-    for (size_t i = 0; i < t->ncol; i++) {
-        const struct column *c = &t->col[i];
-        snprintf(s, sizeof s, "# Column %zu: ", i + 1);
-        put_text(k, s);
-        put_padded(k, c->name, width + 1);
-        put_text(k, "[");
-        put_plain(k, c->unit, 1);
-        put_text(k, ",");
-        put_type(k, c, t->nrow);
-        put_text(k, "] ");
-        put_plain(k, c->what[0] ? c->what : "no description", 0);
-        put_text(k, "\n");
-    }
-    for (size_t i = 0; i < t->nkey; i++) {
-        put_text(k, "# Keyword: ");
-        put_safe(k, t->key[i].name);
-        put_text(k, " = ");
-        put_safe(k, t->key[i].value);
-        put_text(k, "\n");
-    }
-    for (size_t i = 0; i < t->nhistory + (record != NULL); i++) {
-        put_text(k, "# HISTORY ");
-        put_safe(k, i < t->nhistory ? t->history[i] : record);
-        put_text(k, "\n");
-    }
-    put_names(k, t);
-}
-
-/* A word must come back as one cell. */
-static int word_fits(const char *w)
-{
-    for (const char *p = w; *p; p++)
-        if ((unsigned char)*p <= 32 || *p == 127)
-            return 0;
-    return w[0] && w[0] != '#';
-}
-
-static int put_row(struct sink *k, const struct table *t, size_t row, const char *name, struct err *e)
-{
-    for (size_t i = 0; i < t->ncol; i++) {
-        const struct column *c = &t->col[i];
-        if (i)
-            put(k, " ", 1);
-        if (c->type == COL_RAGGED) {
-            if (c->start[row + 1] <= c->start[row])
-                return err_set(e, E_DATA, "%s: row %zu: column %s has no values", name, row + 1, c->name);
-            for (size_t j = c->start[row]; j < c->start[row + 1]; j++) {
-                if (j > c->start[row])
-                    put(k, " ", 1);
-                put_number(k, COL_REAL, c, j);
-            }
-        } else if (c->type == COL_TEXT) {
-            if (c->v.s[row][0] && !word_fits(c->v.s[row]))
-                return err_set(e, E_DATA, "%s: row %zu: column %s: '%.60s' is not one word: write FITS", name, row + 1,
-                               c->name, c->v.s[row]);
-            put_text(k, c->v.s[row][0] ? c->v.s[row] : "-");
-        } else {
-            put_number(k, c->type, c, row);
-        }
-    }
-    put(k, "\n", 1);
-    return OK;
-}
-
-static int write_text(const struct table *t, const char *name, const char *record, const char *const *inputs,
-                      size_t n_inputs, struct err *e)
-{
-    const char *shown = strcmp(name, "-") == 0 ? "standard output" : name;
-    struct sink k = {.buf = malloc(SINK)};
-    if (!k.buf)
-        return err_set(e, E_NOMEM, "%s: %s", shown, err_text(E_NOMEM));
-    int st = outfile_open(&k.o, name, inputs, n_inputs, e);
-    if (!st) {
-        put_header(&k, t, record);
-        for (size_t i = 0; i < t->nrow && !st && !k.st; i++)
-            st = put_row(&k, t, i, shown, e);
-        sink_flush(&k);
-        if (!st && k.st)
-            st = err_set(e, k.st, "%s: %s", shown, k.st == E_IO ? strerror(errno) : err_text(k.st));
-        if (st)
-            outfile_abandon(k.o);
-        else
-            st = outfile_commit(k.o, e);
-    }
-    free(k.buf);
-    return st;
-}
-
-static int write_fits(const struct table *t, const char *name, const char *record, const char *const *inputs,
-                      size_t n_inputs, struct err *e)
-{
-    struct table view = *t;                      /* the same columns with one HISTORY line more */
-    struct fits_out *f;
-    view.history = malloc((t->nhistory + 1) * sizeof *view.history);
-    char *line = record ? strdup(record) : NULL;
-    if (!view.history || (record && !line)) {
-        free(view.history);
-        free(line);
-        return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
-    }
-    for (size_t i = 0; i < t->nhistory; i++)
-        view.history[i] = t->history[i];
-    if (record)
-        view.history[view.nhistory++] = line;
-    int st = fits_out_open(&f, name, inputs, n_inputs, e);
-    if (!st) {
-        st = fits_out_hdu(f, -32, 0, 0, 1, NULL, e);
-        if (!st)
-            st = fits_out_table(f, &view, "CATALOGUE", e);
-        if (st)
-            fits_out_abandon(f);
-        else
-            st = fits_out_commit(f, e);
-    }
-    free(view.history);
-    free(line);
-    return st;
-}
-
-int table_write(const struct table *t, const char *name, const char *record, const char *const *inputs,
-                size_t n_inputs, struct err *e)
-{
-    size_t n = strlen(name);
-    if (n > 5 && strcmp(name + n - 5, ".fits") == 0)
-        return write_fits(t, name, record, inputs, n_inputs, e);
-    return write_text(t, name, record, inputs, n_inputs, e);
 }

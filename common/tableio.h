@@ -1,6 +1,6 @@
 /*
  * tableio.h - catalogues as text or FITS.  tableio.c is the only file that
- * parses or prints catalogues.
+ * parses catalogues, tablewrite.c the only one that prints them.
  *
  * Text form (pixshear(7)): four header parts, then one row per line.  On
  * reading, names come from the last "# NAME NAME ..." line, types and units
@@ -17,6 +17,7 @@
 
 #include "err.h"
 #include "table.h"
+#include "tablerows.h"
 
 /*
  * Read a catalogue; "-" is standard input; FITS is recognised by its first
@@ -31,5 +32,24 @@ MUST_CHECK int table_read(struct table *t, const char *name, double max_memory, 
  */
 MUST_CHECK int table_write(const struct table *t, const char *name, const char *record,
                            const char *const *inputs, size_t n_inputs, struct err *e);
+
+/* The same with the rows of `rows`; t is the header and knows the columns, its own rows are not looked at. */
+MUST_CHECK int table_write_rows(const struct table *t, struct table_rows *rows, const char *name, const char *record,
+                                const char *const *inputs, size_t n_inputs, struct err *e);
+
+/*
+ * Reading in blocks: t gets the header (columns without rows, keywords,
+ * HISTORY), table_in_rows() replaces its rows by the next n at most, none at the
+ * end.  Columns that are added to t behind those of the file are left as
+ * table_resize() makes them.  A pipe whose header has no types of columns is held
+ * whole, as are gzip'ed files and FITS from a pipe.  `name` must stay until table_in_close().
+ */
+struct table_in;
+MUST_CHECK int table_in_open(struct table_in **in, struct table *t, const char *name, double max_memory, struct err *e);
+MUST_CHECK int table_in_rows(struct table_in *in, struct table *t, size_t n, struct err *e);
+void table_in_close(struct table_in *in);
+
+/* A number of rows that takes about a megabyte. */
+size_t table_block_rows(const struct table *t);
 
 #endif

@@ -19,7 +19,7 @@ clean_run() { # LABEL: judge the run in $st with output out, reference ref
         [ "$(wc -l <err)" -eq 1 ] || echo "$1: $(wc -l <err) lines: $(head -c 200 err)"
         [ -e out$ext ] && echo "$1: left an output"
     fi
-    ls -A | grep -vxF -f inputs | grep -vxE '(out|ref)(\.png)?|err|inputs|count|wrong' | sed "s/^/$1: left /"
+    ls -A | grep -vxF -f inputs | grep -vxE '(out|ref)(\.png|\.fits)?|err|inputs|count|wrong' | sed "s/^/$1: left /"
 }
 
 sweep() { # NAME COMMAND...: the command writes to "out"
@@ -67,5 +67,12 @@ sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
 sweep "rrgshape with two outputs" rrgshape noisy.fits cat.txt --stars stars.rrg --plain /dev/null
 sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
 sweep fom fom cut.txt
+# rows that wait on disk: more than the 4 MiB that stay in memory
+awk 'BEGIN { print "# Column 1: A [,i64] a number\n# Column 2: B [,f64] another\n# A B"; for (i = 0; i < 300000; i++) print i, i / 7 }' >many.txt
+cutcat many.txt --only-where -o many.fits
+ls >inputs
+ext=.fits
+sweep "cutcat of many blocks" cutcat many.fits --only-where
+ext=
 ext=.png
 sweep fits2png fits2png noisy.fits

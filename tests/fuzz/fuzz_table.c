@@ -74,7 +74,7 @@ void fuzz_file(const char *name)
         scene_free(&s);
     if (models)
         models_free(&m);
-    if (fom_image_read(&im, &t, "S_N", &e) == OK)
+    if (fom_image_read(&im, NULL, &t, "fuzz", "S_N", 64e6, &e) == OK)
         fom_image_free(&im);
     twice(&t);
     table_free(&t);

@@ -37,10 +37,10 @@ linear() {
     between "$1: bytes for one object more" "$(awk -v a="${!m}" -v b="${!l}" 'BEGIN { print 1024 * (a - b) / 900000 }')" 50 "$2"
 }
 linear rrgshape 760
-linear cutcat 760
+between "cutcat: KiB for a million objects" "$mcutcat_1000000" 1000 32768
 linear fom 420
 # refused before the memory is taken
-for p in "rrgshape f.fits in.1000000 --psf none -o no" "cutcat out.1000000 -o no" "fom g0.1000000 -o no"; do
+for p in "rrgshape f.fits in.1000000 --psf none -o no" "fom g0.1000000 -o no"; do
     # shellcheck disable=SC2086
     fails "--max-memory 30M: ${p%% *}" 1 $p --max-memory 30M
     peak peak.txt $p --max-memory 30M >cmd.out 2>cmd.err
