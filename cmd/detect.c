@@ -277,7 +277,9 @@ static int check_row(enum check_type type, const struct frame *f, const struct d
     memset(row, 0, (size_t)nx * sizeof *row);
     for (size_t i = d->label.row[y]; i < d->label.row[y + 1]; i++) {
         const struct label_run *r = &d->label.run[i];
-        background_subtract(&d->background, f->im.pix + at + r->x0, y, r->x0, r->x1 - r->x0, NAN, row + r->x0);
+        background_subtract(&d->background, f->im.pix + at + r->x0, y, r->x0, r->x1 - r->x0, 0, row + r->x0);
+        for (long x = r->x0; f->map && x < r->x1; x++)
+            row[x] = f->map[at + (size_t)x] <= FLT_MAX ? row[x] : 0;
     }
     return OK;
 }

@@ -39,7 +39,7 @@ void pages_keep(size_t bytes)
     (void)mallopt(M_TRIM_THRESHOLD, KEPT);
     (void)mallopt(M_TOP_PAD, STEP);
     (void)mallopt(M_ARENA_MAX, 1);
-    (void)mallopt(M_MMAP_THRESHOLD, FIRST + 1);
+    (void)mallopt(M_MMAP_THRESHOLD, FIRST + STEP);
     void *p = bytes >= 2 * (size_t)LARGE ? malloc(bytes) : NULL;
     pages_large(p, bytes);
     free(p);

@@ -570,6 +570,8 @@ static void position_errors(const struct field *f, const struct blob *b, int32_t
                 size_t at = (size_t)y * (size_t)f->im->nx + (size_t)x;
                 background_subtract(f->b, f->im->pix + at, y, x, n, 0, v);
                 for (long k = 0; k < n; k++) {
+                    if (f->b->bad && !is_good(f, at + (size_t)k))
+                        continue;
                     double rms = f->p->rms_map ? (double)f->p->rms_map[at + (size_t)k] : 0;
                     double var = cor * (f->p->rms_map ? rms * rms : rms2) + (v[k] > 0 ? (double)v[k] * photon : 0);
                     double dx = (double)(x + k) - o->x, dy = (double)y - o->y;

@@ -7,6 +7,7 @@
  */
 #include "segment.h"
 #include "grow.h"
+#include "mend.h"
 #include "simd.h"
 #include <float.h>
 #include <math.h>
@@ -28,6 +29,9 @@ struct feeder {
     float *across;         /* ring of 2r+1 rows filtered along x */
     const float **window;  /* 2r+1 pointers for the column filter */
     float *zero;           /* nx zeros */
+    struct mend mend;      /* of images with bad pixels, else empty */
+    unsigned char *kind;   /* ring of 2r+1 rows, what the pixels are; NULL without bad ones */
+    float *rms;            /* ring of 2r+1 rows of the map; NULL likewise */
 };
 
 static void feeder_free(struct feeder *f)
@@ -36,6 +40,17 @@ static void feeder_free(struct feeder *f)
     free(f->across);
     free(f->window);
     free(f->zero);
+    mend_free(&f->mend);
+    free(f->kind);
+    free(f->rms);
+}
+
+/* Row y0 is filtered next. */
+static void feeder_seek(struct feeder *f, long y0)
+{
+    f->next = y0 - (long)f->filter->radius;
+    if (f->kind)
+        mend_seek(&f->mend, f->next > 0 ? f->next : 0);
 }
 
 static int feeder_open(struct feeder *f, long y0)
@@ -45,18 +60,18 @@ static int feeder_open(struct feeder *f, long y0)
     f->across = malloc(n * nx * sizeof(float));
     f->window = malloc(n * sizeof *f->window);
     f->zero = calloc(nx, sizeof(float));
-    if (!f->plain || !f->across || !f->window || !f->zero) {
-        feeder_free(f);
-        return E_NOMEM;
+    int st = f->plain && f->across && f->window && f->zero ? OK : E_NOMEM;
+    if (!st && f->b->bad) {
+        f->kind = malloc(n * nx);
+        f->rms = f->rms_map ? malloc(n * nx * sizeof(float)) : NULL;
+        st = f->kind && (f->rms || !f->rms_map) ? mend_new(&f->mend, f->im, f->b, f->rms_map) : E_NOMEM;
     }
-    f->next = y0 - (long)r;
+    if (st) {
+        feeder_free(f);
+        return st;
+    }
+    feeder_seek(f, y0);
     return OK;
-}
-
-WIDE static void blank_bad(const float *restrict rms, long n, float *restrict v)
-{
-    for (long i = 0; i < n; i++)
-        v[i] = rms[i] <= FLT_MAX ? v[i] : 0;
 }
 
 WIDE static void negate(long n, float *v)
@@ -82,7 +97,18 @@ static float *across_row(const struct feeder *f, long y)
     return f->across + ring_place(f, y) * (size_t)f->im->nx;
 }
 
-/* Row y above background (0 where bad) into the rings. */
+static unsigned char *kind_row(const struct feeder *f, long y)
+{
+    return f->kind ? f->kind + ring_place(f, y) * (size_t)f->im->nx : NULL;
+}
+
+/* rms of the pixels of row y, which is in the ring; NULL without a map. */
+static float *rms_row(const struct feeder *f, long y)
+{
+    return f->rms ? f->rms + ring_place(f, y) * (size_t)f->im->nx : NULL;
+}
+
+/* Row y above background, bad pixels bridged or 0, into the rings. */
 static void feeder_take(struct feeder *f, long y)
 {
     long nx = f->im->nx, r = f->filter->radius;
@@ -91,8 +117,8 @@ static void feeder_take(struct feeder *f, long y)
     float *plain = plain_row(f, y);
     size_t at = (size_t)y * (size_t)nx;
     background_subtract(f->b, f->im->pix + at, y, 0, nx, 0, plain);
-    if (f->rms_map)
-        blank_bad(f->rms_map + at, nx, plain);
+    if (f->kind)
+        mend_row(&f->mend, plain, kind_row(f, y), rms_row(f, y));
     if (f->negative)
         negate(nx, plain);
     if (r == 0)
@@ -134,6 +160,7 @@ int segment_filtered(const struct image *im, const struct background *b, const f
 
 struct stretch {
     uint16_t y, x0, x1;
+    uint16_t good;         /* pixels that are not bad */
 };
 
 struct strip {
@@ -171,11 +198,11 @@ WIDE static void mark_above(const float *restrict v, float threshold, long n, un
         above[i] = v[i] > threshold;
 }
 
-/* Take back the pixels that are not finite. */
-WIDE static void unmark_bad(const float *restrict raw, long n, unsigned char *restrict above)
+/* Take back the bad pixels. */
+WIDE static void unmark_bad(const unsigned char *restrict kind, long n, unsigned char *restrict above)
 {
     for (long i = 0; i < n; i++)
-        above[i] = fabsf(raw[i]) <= FLT_MAX ? above[i] : 0;
+        above[i] = kind[i] == PIXEL_BAD ? 0 : above[i];
 }
 
 /* v = 0 where it does not exceed k * rms; bad pixels have infinite rms. */
@@ -185,19 +212,29 @@ WIDE static void cut_by_map(const float *restrict rms, float k, long n, float *r
         v[i] = v[i] > k * rms[i] ? v[i] : 0;
 }
 
-static int add_run(struct strip *s, long y, long x0, long x1, const float *smooth, const float *plain)
+/* What is known of the pixels of a row. */
+struct scanned {
+    long y;
+    const float *smooth, *plain;
+    const unsigned char *kind;         /* NULL: all are good */
+};
+
+static int add_run(struct strip *s, const struct scanned *row, long x0, long x1)
 {
-    size_t n = (size_t)(x1 - x0);
+    size_t n = (size_t)(x1 - x0), good = n;
     int st = grow(&s->run, &s->cap_run, s->nrun + 1, sizeof *s->run);
     if (!st)
         st = grow(&s->pair, &s->cap_pair, 2 * (s->npix + n), sizeof *s->pair);
     if (st)
         return st;
-    s->run[s->nrun++] = (struct stretch){(uint16_t)y, (uint16_t)x0, (uint16_t)x1};
+    for (long x = x0; row->kind && x < x1; x++)
+        good -= row->kind[x] != PIXEL_GOOD;
+    s->run[s->nrun++] = (struct stretch){(uint16_t)row->y, (uint16_t)x0, (uint16_t)x1, (uint16_t)good};
     float *to = s->pair + 2 * s->npix;
+    const float *smooth = row->smooth + x0, *plain = row->plain + x0;
     for (size_t i = 0; i < n; i++) {
-        to[2 * i] = smooth[(size_t)x0 + i];
-        to[2 * i + 1] = plain[(size_t)x0 + i];
+        to[2 * i] = smooth[i];
+        to[2 * i + 1] = plain[i];
     }
     s->npix += n;
     return OK;
@@ -216,7 +253,7 @@ static uint64_t bits_of(const unsigned char *byte)
 }
 
 /* Runs of the bytes 1 of a row. */
-static int scan_row(struct strip *s, long y, long nx, const unsigned char *above, const float *smooth, const float *plain)
+static int scan_row(struct strip *s, const struct scanned *row, long nx, const unsigned char *above)
 {
     long start = -1;
     for (long x = 0; x < nx; x += BLOCK) {
@@ -227,13 +264,13 @@ static int scan_row(struct strip *s, long y, long nx, const unsigned char *above
                 start = i;
                 continue;
             }
-            int st = add_run(s, y, start, i, smooth, plain);
+            int st = add_run(s, row, start, i);
             if (st)
                 return st;
             start = -1;
         }
     }
-    return start >= 0 ? add_run(s, y, start, nx, smooth, plain) : OK;
+    return start >= 0 ? add_run(s, row, start, nx) : OK;
 }
 
 /* One strip with a feeder that is open. */
@@ -242,17 +279,18 @@ static int search_strip(const struct search *s, long i, struct scratch *w)
     const struct segment_params *p = s->p;
     long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
     int st = OK;
-    w->feeder.next = y0 - s->filter->radius;
+    feeder_seek(&w->feeder, y0);
     for (long y = y0; y < y1 && !st; y++) {
-        const float *plain;
-        size_t at = (size_t)y * (size_t)nx;
-        feeder_row(&w->feeder, y, w->smooth, &plain);
+        struct scanned row = {.y = y, .smooth = w->smooth};
+        feeder_row(&w->feeder, y, w->smooth, &row.plain);
+        const float *rms = rms_row(&w->feeder, y);
+        row.kind = kind_row(&w->feeder, y);
         if (p->rms_map)
-            cut_by_map(p->rms_map + at, (float)p->threshold, nx, w->smooth);
+            cut_by_map(rms ? rms : p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, w->smooth);
         mark_above(w->smooth, p->rms_map ? 0 : (float)(p->threshold * p->noise), nx, w->above);
-        if (s->b->bad)
-            unmark_bad(s->im->pix + at, nx, w->above);
-        st = scan_row(&s->strip[i], y, nx, w->above, w->smooth, plain);
+        if (row.kind)
+            unmark_bad(row.kind, nx, w->above);
+        st = scan_row(&s->strip[i], &row, nx, w->above);
     }
     return st;
 }
@@ -354,8 +392,8 @@ static void join_runs(const struct strip *strip, long n, uint32_t *parent, size_
 }
 
 /*
- * Number the components of at least min_area pixels from 1, in order of their first runs, into number[] at these, 0
- * for the others; count their runs into first[c + 2] and their pixels into at[c + 1], c from 0.
+ * Number the components of at least min_area good pixels from 1, in order of their first runs, into number[] at these, 0
+ * for the others; count their runs into first[c + 2]; at[c]: where their pixels begin.
  */
 static int count_components(struct segments *s, const struct strip *strip, long n, const uint32_t *parent,
                             uint32_t *number, size_t nrun, long min_area, size_t **at)
@@ -363,30 +401,28 @@ static int count_components(struct segments *s, const struct strip *strip, long 
     size_t i = 0, ncomp = 0;
     for (long k = 0; k < n; k++)
         for (size_t j = 0; j < strip[k].nrun; j++, i++)
-            number[parent[i]] += (uint32_t)(strip[k].run[j].x1 - strip[k].run[j].x0);
+            number[parent[i]] += strip[k].run[j].good;
     for (i = 0; i < nrun; i++)
         ncomp += number[i] >= (size_t)min_area;
     s->first = calloc(ncomp + 2, sizeof *s->first);
-    *at = malloc((ncomp + 1) * sizeof **at);
+    *at = calloc(ncomp + 1, sizeof **at);
     if (!s->first || !*at)
         return E_NOMEM;
-    (*at)[0] = 0;
-    for (i = 0; i < nrun; i++)
-        if (parent[i] != i) {
+    i = 0;
+    for (long k = 0; k < n; k++)
+        for (const struct stretch *r = strip[k].run, *end = r + strip[k].nrun; r < end; r++, i++) {
+            if (parent[i] == i)
+                number[i] = number[i] >= (size_t)min_area ? (uint32_t)++s->ncomponent : 0;
             uint32_t c = number[parent[i]];
-            if (c) {
-                s->first[c + 1]++;
-                s->nrun++;
-            }
-        } else if (number[i] >= (size_t)min_area) {
-            s->npix += number[i];
-            number[i] = (uint32_t)++s->ncomponent;
-            (*at)[number[i]] = s->npix;
-            s->first[number[i] + 1]++;
+            if (c == 0)
+                continue;
+            s->first[c + 1]++;
             s->nrun++;
-        } else {
-            number[i] = 0;
+            (*at)[c] += (size_t)(r->x1 - r->x0);
         }
+    for (size_t c = 0; c < ncomp; c++)
+        (*at)[c + 1] += (*at)[c];
+    s->npix = (*at)[ncomp];
     return OK;
 }
 

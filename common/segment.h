@@ -43,8 +43,8 @@ struct segment_params {
 };
 
 /*
- * Find.  Pixels that are not finite (b->bad says whether there are any) count as 0
- * in the filter and are never detected; outside the image is 0.
+ * Find.  Bad pixels (b->bad says whether there are any) are bridged as mend.h says; those that stay bad
+ * count as 0 in the filter and are never detected; the minimum area is one of good pixels; outside the image is 0.
  */
 MUST_CHECK int segment_find(struct segments *s, const struct image *im, const struct background *b,
                             const struct smooth *filter, const struct segment_params *p);

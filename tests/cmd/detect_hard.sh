@@ -78,6 +78,18 @@ img islands.fits 160 160 'my $g = 300 * exp(-(($x - 80) ** 2 + ($y - 80) ** 2) /
 rows "islands of NaN and infinity, objects that touch them" 2 4 islands.fits
 near "object with a hole of minus infinity flagged 32" "$(flag 32 80 81)" 1 0
 near "object beside NaN flagged 32" "$(awk '/^#/ { k = split($0, h, " "); for (i = 2; i <= k; i++) c[h[i]] = i - 1; next } ($c["X_IMAGE"] - 39)^2 + ($c["Y_IMAGE"] - 31)^2 < 50 { print int($c["FLAGS"] / 32) % 2; exit }' rows.cat)" 1 0
+# bright objects cut by dead columns, dead rows and a hole stay in one piece, where they are; deeper holes stay holes
+img cut.fits 200 200 'my $g = 0; for my $p ([41, 40], [120, 41], [40, 121], [121, 121], [160, 160]) { $g += 5000 * exp(-(($x - $p->[0]) ** 2 + ($y - $p->[1]) ** 2) / 12.5) }
+    ($x > 37 && $x < 43 && $y < 80) || ($y > 118 && $y < 123 && $x < 80) || (abs($x - 120) < 3 && abs($y - 42) < 3) || $x > 183 ? "nan" + 0 : 50 + 4 * n() + $g' "${K[@]}"
+rows "objects cut by dead columns and rows" 5 5 cut.fits -t 10
+for p in 41,40 120,41 40,121 121,121 160,160; do
+    near "cut or not, the object at $p is there" "$(awk -v p="$p" 'BEGIN { split(p, q, ",") } /^#/ { k = split($0, h, " "); for (i = 2; i <= k; i++) c[h[i]] = i - 1; next }
+        { d = sqrt(($c["X_IMAGE"] - 1 - q[1])^2 + ($c["Y_IMAGE"] - 1 - q[2])^2); if (!n++ || d < m) m = d } END { print m }' rows.cat)" 0 0.6
+done
+near "the cut ones flagged 32, not the others" "$(flag 32 42 41)$(flag 32 121 42)$(flag 32 41 122)$(flag 32 122 122)$(flag 32 161 161)" 11100 0
+img noise.fits 200 200 '50 + 4 * n()' "${K[@]}"
+perl "$F" make stripes.fits 200 200 '$x % 20 < 8 ? 0 : 1'
+near "bridges between noise are no objects: stripes of 8 dead columns" "$(detect -q -t 2 -k 0 --min-area 4 --rms 4 -w stripes.fits noise.fits | grep -vc '^#')" 0 "$(detect -q -t 2 -k 0 --min-area 4 --rms 4 noise.fits | grep -vc '^#')"
 img field.fits 160 160 '100 + 4 * n() + 300 * exp(-(($x - 80) ** 2 + ($y - 40) ** 2) / 18) + 300 * exp(-(($x - 40) ** 2 + ($y - 100) ** 2) / 18)' "${K[@]}"
 img half.fits 160 160 '$x > 79 ? 0 : 1'
 rows "half without weight, an object across the border" 2 2 field.fits -w half.fits
