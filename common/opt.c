@@ -17,9 +17,9 @@
 
 /* The options of every program; take_shared() knows where they go. */
 static const struct opt shared_options[] = {
-    {"output", 'o', OPT_STR, 0, 0, 0, "FILE", "output file, - is standard output", 0, 1},
-    {"seed", 's', OPT_LONG, 0, 0, 0, "N", "seed of all random numbers", 0, 0},
-    {"threads", 'j', OPT_LONG, 0, 1, 256, "N", "threads; the result does not depend on it", 0, 0},
+    {"output", 'o', OPT_STR, 0, 0, 0, "FILE", "output file, - is standard output [-]", 0, 1},
+    {"seed", 's', OPT_LONG, 0, 0, 0, "N", "seed of all random numbers [1]", 0, 0},
+    {"threads", 'j', OPT_LONG, 0, 1, 256, "N", "threads; the result does not depend on it [1]", 0, 0},
     {"max-memory", 0, OPT_REAL, 0, 1, 1e18, "BYTES", "refuse to use more (K, M, G understood)", 0, 0},
     {"check", 0, OPT_FLAG, 0, 0, 0, 0, "validate, print plan and cost, do nothing", 0, 0},
     {"verbose", 'v', OPT_FLAG, 0, 0, 0, 0, "say what is done", 0, 0},
