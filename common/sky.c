@@ -45,7 +45,21 @@ static int wcs_failed(struct err *e, const struct wcsprm *w, const char *what, i
     return err_set(e, code == WCSERR_MEMORY ? E_NOMEM : E_DATA, "%s: %s", what, line);
 }
 
-/* The cards as one string for wcspih; those without a value are not needed. */
+/* Text without its closing quote: wcspih would go on to the quote of another card, and write beyond its memory. */
+static int without_end(const char *card)
+{
+    const char *p = card + 9;
+    while (*p == ' ')
+        p++;
+    if (*p++ != '\'')
+        return 0;
+    for (; *p; p++)
+        if (*p == '\'' && *++p != '\'')
+            return 0;
+    return 1;
+}
+
+/* The cards as one string for wcspih; those without a value are not needed, those without an end not wanted. */
 static char *join(const struct header *h, int *n)
 {
     char *text = malloc(h->n * 80 + 1);
@@ -53,7 +67,7 @@ static char *join(const struct header *h, int *n)
         return NULL;
     *n = 0;
     for (size_t i = 0; i < h->n; i++)
-        if (h->card[i][8] == '=')
+        if (h->card[i][8] == '=' && !without_end(h->card[i]))
             memcpy(text + 80 * (size_t)(*n)++, h->card[i], 80);
     text[80 * (size_t)*n] = 0;
     return text;
@@ -61,7 +75,12 @@ static char *join(const struct header *h, int *n)
 
 static int parse(struct sky *s, const struct header *h, struct err *e)
 {
+    static const char *const needed[] = {"CTYPE", "CUNIT", "RADESYS", "CPDIS", "CQDIS"};
     int n, rejected;
+    for (size_t i = 0; i < h->n; i++)
+        for (size_t k = 0; k < sizeof needed / sizeof *needed; k++)
+            if (!strncmp(h->card[i], needed[k], strlen(needed[k])) && h->card[i][8] == '=' && without_end(h->card[i]))
+                return err_set(e, E_DATA, "WCS: %.*s is text without a closing quote", (int)strcspn(h->card[i], " ="), h->card[i]);
     char *text = h->n < 1000000 ? join(h, &n) : NULL;
     if (!text)
         return err_set(e, E_NOMEM, "out of memory");

@@ -215,8 +215,40 @@ static void test_failures(void)
     header_free(&h);
 }
 
+/* A header whose cards wcslib has to read, one of them replaced by `card`: what sky_open says. */
+static int with_card(const char *key, const char *card, struct err *e)
+{
+    struct header h = tan_header(0.1, 10, 20, 150, 2.2);
+    struct sky *s;
+    set(&h, "LONPOLE", 180);
+    header_remove(&h, key);
+    if (header_append(&h, card) || header_append(&h, "CNAME1  = 'a quote that comes later, and many letters behind it in another card'"))
+        abort();
+    const int st = sky_open(&s, &h, e);
+    if (st == OK)
+        sky_close(s);
+    header_free(&h);
+    return st;
+}
+
+/* wcslib 7.12 reads on to the next quote and ends the program. */
+static void test_text_without_end(void)
+{
+    static const char *const bad[] = {"CTYPE1  = 'RA---TAN:           / gnomonic projection", "CTYPE2  = 'DEC--TAN''", "CUNIT1  ='deg",
+                                      "RADESYS = 'ICRS"};
+    static const char *const key[] = {"CTYPE1", "CTYPE2", "CUNIT1", "RADESYS"};
+    struct err e = {""};
+    int refused = 0;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        refused += with_card(key[i], bad[i], &e) == E_DATA && strstr(e.text, "closing quote");
+    check_that(refused == 4, "%d of 4 keywords without a closing quote are refused: %s", refused, e.text);
+    check_that(with_card("OBJECT", "OBJECT  = 'it''s", &e) == OK, "one that no WCS needs is not");
+    check_that(with_card("OBJECT", "OBJECT  = 'it''s'", &e) == OK, "nor two quotes for one");
+}
+
 int main(void)
 {
+    test_text_without_end();
     test_tan();
     test_rotated();
     test_distorted();
