@@ -157,19 +157,19 @@ static int cut_stamp(const struct field *f, double cx, double cy, double hx, dou
 struct ellipse {
     double cxx, cyy, cxy;                  /* cxx x^2 + cyy y^2 + cxy x y = r^2 */
     double ext_x, ext_y;                   /* half sides of the box for r = 1 */
+    double shear, wide;                    /* cxy / 2 cxx and 1 / cxx: of the rows */
 };
 
 static struct ellipse ellipse_of(double xx, double xy, double yy)
 {
     double det = xx * yy - xy * xy;
-    return (struct ellipse){yy / det, xx / det, -2 * xy / det, sqrt(xx), sqrt(yy)};
+    return (struct ellipse){yy / det, xx / det, -2 * xy / det, sqrt(xx), sqrt(yy), -xy / yy, det / yy};
 }
 
 /* Columns of stamp row y inside radius r: [*a, *b). */
 static void row_range(const struct stamp *s, const struct ellipse *e, double r, long y, long *a, long *b)
 {
-    double dy = (double)y - s->cy, half = e->cxy * dy / (2 * e->cxx);
-    double d = half * half - (e->cyy * dy * dy - r * r) / e->cxx;
+    double dy = (double)y - s->cy, half = e->shear * dy, d = half * half - (e->cyy * dy * dy - r * r) * e->wide;
     *a = *b = 0;
     if (!(d >= 0))
         return;
@@ -316,13 +316,13 @@ static struct gauss gauss_of(double w2)
     return (struct gauss){w2, exp(-1 / w2)};
 }
 
-/* w[i] = exp(-(i - c)^2 / 2 w2) for 0 <= i < n, by steps from the peak outwards. */
+/* w[i] = exp(-(i - c)^2 / 2 w2) over its largest value, for 0 <= i < n, by steps from the peak outwards. */
 static void gaussian_line(const struct gauss *g, double c, long n, double *w)
 {
     double near = nearbyint(c);
     long top = near > 0 ? near < (double)(n - 1) ? (long)near : n - 1 : 0;
     double d = (double)top - c;
-    w[top] = exp(-0.5 * d * d / g->w2);
+    w[top] = 1;
     double up = exp(-(d + 0.5) / g->w2), down = g->step2 / up;
     for (long i = top + 1; i < n; i++, up *= g->step2)
         w[i] = w[i - 1] * up;
@@ -368,8 +368,8 @@ WIDE static void stamp_sums(const float *v, long stride, const struct weights *w
 }
 
 /*
- * Sums of I W, I W r^2, W^2 and first moments for W = exp(-r^2 / 2 w2), within
- * 4 sqrt(w2).  line: room for 5 (sides + LANES).
+ * Sums of I W, I W r^2, W^2 and first moments for W proportional to exp(-r^2 / 2 w2),
+ * within 4 sqrt(w2).  line: room for 5 (sides + LANES).
  */
 static void weighted_sums(const struct stamp *s, double cx, double cy, const struct gauss *g, double *line, double out[5])
 {

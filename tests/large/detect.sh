@@ -1,6 +1,7 @@
 # A million one-pixel objects, a plateau of four million pixels, 16384 and 32768 pixels a side: time linear, memory bounded, nothing lost.
-# seconds of CPU and KiB of the command, into $cpu and $kib
-measured() { /usr/bin/time -f '%U %S %M' -o used.txt "$@" && read -r user system kib < <(tail -1 used.txt) && cpu=$(awk "BEGIN { print $user + $system }"); }
+# seconds in the program, in the system and KiB of the command, into $user, $system and $kib.  Linear is the program: handing out
+# the same pages took the system 0.13 to 2.8 s at 16384 a side, as its host had them at hand or not.
+measured() { /usr/bin/time -f '%U %S %M' -o used.txt "$@" && read -r user system kib < <(tail -1 used.txt); }
 grid() { # SIDE EXPRESSION: 16-bit image of SIDE x SIDE pixels, noise of a cheap generator
     { printf '%-80s' "SIMPLE  =                    T" "BITPIX  =                   16" "NAXIS   =                    2" \
         "NAXIS1  = $(printf %20d "$1")" "NAXIS2  = $(printf %20d "$1")" "MAGZERO =                 30.0" "PIXSCALE=                  0.1" END; printf '%*s' 2240 ''; }
@@ -13,7 +14,7 @@ for side in 750 3000; do
     ok "$((side * side / 9)) one-pixel objects" measured detect -k 0 --min-area 1 --rms 3.5 -t 50 dots$side.fits -o dots$side.fits.cat
     near "all found" "$(grep -vc '^#' dots$side.fits.cat)" $((side * side / 9)) 0
     near "no NaN" "$(grep -v '^#' dots$side.fits.cat | grep -ci nan)" 0 0
-    used[side]=$cpu
+    used[side]=$user
 done
 between "CPU of 16 times as many objects over 16 times the CPU" "$(awk "BEGIN { print ${used[3000]} / 16 / ${used[750]} }")" 0.2 2
 grid 2000 'x > 3 ? 20000 + r : r' >plateau.fits
@@ -34,10 +35,10 @@ wide() { # SIDE
 for side in 4096 16384 32768; do
     wide $side >wide.fits
     ok "$side x $side pixels" measured detect -q wide.fits -t 10 -o wide.cat.fits
-    echo "# $side x $side: $cpu s of CPU, $kib KiB"
+    echo "# $side x $side: $user s of CPU and $system s of the system, $kib KiB"
     between "bytes a pixel, less 16 MiB" "$(awk "BEGIN { print ($kib - 16384) * 1024 / $side ^ 2 }")" 1 6
     near "objects, one in each 128 x 128 pixels" "$(grep -a -o 'NAXIS2  = *[0-9]*' wide.cat.fits | tail -1 | grep -o '[0-9]*$')" $((side * side / 16384)) 0
-    used[side]=$cpu
+    used[side]=$user
     rm wide.fits
 done
 between "CPU a pixel of 16384 over 4096 a side" "$(awk "BEGIN { print ${used[16384]} / 16 / ${used[4096]} }")" 0.3 2
