@@ -159,6 +159,8 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     int wcs = sky_open(&f->sky, h, &e);
     if (wcs == E_NOMEM)
         die(EXIT_RUN, "%s: %s", in, e.text);
+    if (wcs == E_DATA && !c->quiet)
+        warn("%s: %s: no positions on the sky", in, e.text);
     if (wcs)
         f->sky = NULL;
     f->scale = o->pixscale > 0 ? o->pixscale : x.scale > 0 ? x.scale : 0;

@@ -73,14 +73,46 @@ static char *join(const struct header *h, int *n)
     return text;
 }
 
+/* A keyword of the primary map that must be a number: CRVAL1, CD1_2, PV2_1, A_2_0, LONPOLE, but not CRVAL1A. */
+static int is_number(const char *key)
+{
+    static const char *const numbered[] = {"CRVAL", "CRPIX", "CDELT", "CROTA", "CD", "PC", "PV", "A_", "B_", "AP_", "BP_"};
+    const size_t last = strlen(key);
+    if (!strcmp(key, "LONPOLE") || !strcmp(key, "LATPOLE"))
+        return 1;
+    for (size_t k = 0; k < sizeof numbered / sizeof *numbered; k++) {
+        const size_t n = strlen(numbered[k]);
+        if (!strncmp(key, numbered[k], n) && isdigit((unsigned char)key[n]) && isdigit((unsigned char)key[last - 1]))
+            return 1;
+    }
+    return 0;
+}
+
+/* What wcslib would leave out without a word, or stumble over. */
+static int check_cards(const struct header *h, struct err *e)
+{
+    static const char *const text[] = {"CTYPE", "CUNIT", "RADESYS", "CPDIS", "CQDIS"};
+    for (size_t i = 0; i < h->n; i++) {
+        const struct header one = {.card = h->card + i, .n = 1, .cap = 1};
+        char key[9];
+        double v;
+        if (h->card[i][8] != '=')
+            continue;
+        snprintf(key, sizeof key, "%.*s", (int)strcspn(h->card[i], " ="), h->card[i]);
+        if (is_number(key) && header_double(&one, key, &v) == E_DATA)
+            return err_set(e, E_DATA, "WCS: %s is not a number: correct the keyword", key);
+        for (size_t k = 0; k < sizeof text / sizeof *text; k++)
+            if (!strncmp(key, text[k], strlen(text[k])) && without_end(h->card[i]))
+                return err_set(e, E_DATA, "WCS: %s is text without a closing quote", key);
+    }
+    return OK;
+}
+
 static int parse(struct sky *s, const struct header *h, struct err *e)
 {
-    static const char *const needed[] = {"CTYPE", "CUNIT", "RADESYS", "CPDIS", "CQDIS"};
     int n, rejected;
-    for (size_t i = 0; i < h->n; i++)
-        for (size_t k = 0; k < sizeof needed / sizeof *needed; k++)
-            if (!strncmp(h->card[i], needed[k], strlen(needed[k])) && h->card[i][8] == '=' && without_end(h->card[i]))
-                return err_set(e, E_DATA, "WCS: %.*s is text without a closing quote", (int)strcspn(h->card[i], " ="), h->card[i]);
+    if (check_cards(h, e))
+        return E_DATA;
     char *text = h->n < 1000000 ? join(h, &n) : NULL;
     if (!text)
         return err_set(e, E_NOMEM, "out of memory");

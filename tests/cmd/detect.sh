@@ -71,6 +71,10 @@ near "flux in electrons, where GAIN is 1 and BUNIT missing" "$(fold -w80 u.fits 
 sed "s/^\(.*\)EXPTIME =               2000.0 /\1BUNIT   = 'nJy     '           /" f.fits >njy.fits
 detect njy.fits -o u.fits
 near "in BUNIT, where that is something else" "$(fold -w80 u.fits | grep -ac "^TUNIT.*'nJy *'")" 5 0
+perl -pe 's/CRVAL1  = .{20}/sprintf "%-30s", "CRVAL1  = 150,5"/e' f.fits >comma.fits
+detect comma.fits -o comma.cat 2>comma.err
+near "a comma in CRVAL1: no positions on the sky" "$(grep -c '^# Column.*ALPHA_J2000' comma.cat)" 0 0
+grep -qx 'detect: comma.fits: WCS: CRVAL1 is not a number: correct the keyword: no positions on the sky' comma.err && pass "and a warning" || fail "warning: $(cat comma.err)"
 fails "a check image that does not exist" 2 detect f.fits --check-image what=x.fits
 fails "an even median filter" 2 detect f.fits --back-filter 2
 [ ! -e x.cat ] && pass "no output after an error" || fail "x.cat exists"

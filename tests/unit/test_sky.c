@@ -241,6 +241,11 @@ static void test_text_without_end(void)
     int refused = 0;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         refused += with_card(key[i], bad[i], &e) == E_DATA && strstr(e.text, "closing quote");
+    check_that(with_card("CRVAL1", "CRVAL1  = 150,5", &e) == E_DATA && with_card("CRPIX2", "CRPIX2  = 'abc'", &e) == E_DATA
+               && with_card("CD1_2", "CD1_2   = 1E-5x", &e) == E_DATA && with_card("PV1_1", "PV1_1   = one", &e) == E_DATA
+               && with_card("LATPOLE", "LATPOLE = 90 deg", &e) == E_DATA && strstr(e.text, "LATPOLE is not a number"),
+               "numbers are read whole or refused: %s", e.text);
+    check_that(with_card("CRVAL1A", "CRVAL1A = 150,5", &e) == OK && with_card("PCOUNT", "PCOUNT  = no", &e) == OK, "where the map needs them");
     check_that(refused == 4, "%d of 4 keywords without a closing quote are refused: %s", refused, e.text);
     check_that(with_card("OBJECT", "OBJECT  = 'it''s", &e) == OK, "one that no WCS needs is not");
     check_that(with_card("OBJECT", "OBJECT  = 'it''s'", &e) == OK, "nor two quotes for one");
