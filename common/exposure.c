@@ -112,9 +112,13 @@ int exposure_keywords(const struct header *h, const char *label, struct exposure
         {"EXPTIME", &new.exptime}, {"TOTTIME", &new.tottime}, {"MAGZERO", &new.magzero},
         {"PIXSCALE", &new.scale}, {"GAIN", &new.gain},
     };
+    static const char *const others[] = {"SKYLEVEL", "SATURATE", "RDNOISE", "NOISECOR", "PSFFWHM", "CCDSCALE"};   /* read where they are needed */
+    double v;
     int st = OK;
     for (size_t i = 0; i < sizeof want / sizeof *want && st == OK; i++)
         st = number(h, label, want[i].key, want[i].v, e);
+    for (size_t i = 0; i < sizeof others / sizeof *others && st == OK; i++)
+        st = number(h, label, others[i], &v, e);
     if (st)
         return st;
     new.unit = unit_of(h);

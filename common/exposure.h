@@ -30,7 +30,7 @@ struct exposure {
 /*
  * What a header says of its exposure, into the fields of x from `unit` on; the
  * others stay.  E_DATA, and x is left alone, when a keyword that must be a
- * number is not, a time, gain or scale is not positive, or PIXSCALE contradicts
+ * number (those here, SKYLEVEL, SATURATE, RDNOISE, NOISECOR, PSFFWHM, CCDSCALE) is not, a time, gain or scale is not positive, or PIXSCALE contradicts
  * the WCS by more than 1e-3.  `label` begins the messages.
  */
 MUST_CHECK int exposure_keywords(const struct header *h, const char *label, struct exposure *x, struct err *e);

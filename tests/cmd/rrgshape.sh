@@ -159,7 +159,8 @@ sed 's/A_IMAGE/A_OTHER/' im.cat >bad.cat; fails "column missing" 1 rrgshape im.f
 head -c 5000 im.fits >short.fits; fails "truncated image" 1 rrgshape short.fits im.cat --psf none -o short.out
 if [ -e short.out ]; then fail "truncated image leaves an output"; else pass "truncated image leaves no output"; fi
 stamp 32 32 "9 9 9 1" >small.fits; fails "segmentation of another size" 1 rrgshape im.fits im.cat --psf none --segmentation small.fits
-for k in "PIXSCALE=                  0.1/PIXSCALE=                 -0.1" "GAIN    =                  1.0/GAIN    =                  0.0" "GAIN    =                  1.0/GAIN    = 'one'               " "SHEAR2  =                  0.0/EXPTIME =                  0.0"; do
+for k in "PIXSCALE=                  0.1/PIXSCALE=                 -0.1" "GAIN    =                  1.0/GAIN    =                  0.0" "GAIN    =                  1.0/GAIN    = 'one'               " "SHEAR2  =                  0.0/EXPTIME =                  0.0" \
+    "SHEAR2  =                  0.0/NOISECOR=                  1,2" "SHEAR2  =                  0.0/SKYLEVEL=                  x.0"; do
     sed "s/$k/" im.fits >odd.fits; fails "image with ${k#*/}" 1 rrgshape odd.fits im.cat --psf none
 done
 perl "$TOP/tests/fits.pl" make cube.fits 8 8 1 'PIXSCALE=                  0.1'; perl -pi -e 's/NAXIS   =                    2/NAXIS   =                    3/; s/EXTEND  =                    T/NAXIS3  =                    3/' cube.fits
