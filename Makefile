@@ -80,7 +80,7 @@ check: all $(UNIT) $(TOOLS) $(BUILD)/fault.so    # run every test
 	BIN=$(BIN) BUILD=$(BUILD) tests/run $(UNIT) $(sort $(wildcard tests/cmd/*.sh tests/peer/*.sh))
 
 check-large: all $(UNIT) $(TOOLS)    # tests that need time or memory
-	BIN=$(BIN) BUILD=$(BUILD) tests/run $(sort $(wildcard tests/large/*.sh))
+	LIMIT=3600 BIN=$(BIN) BUILD=$(BUILD) tests/run $(sort $(wildcard tests/large/*.sh))
 
 sanitize:    # the tests again under AddressSanitizer and UndefinedBehaviorSanitizer
 	LIMIT=3600 $(MAKE) check BUILD=build/sanitize BIN=build/sanitize/bin CFLAGS='-O1 -g' \
