@@ -26,7 +26,6 @@ struct chain {
     struct par_turns *turns;
     long order[PLACES][N], n[PLACES];
     long fail;                     /* item that fails, or -1 */
-    volatile double sink;
 };
 
 /* Takes items, works for a time that differs from one to the next, holds up to HELD, and enters each at every place in its turn. */
@@ -40,8 +39,8 @@ static int chained(void *ctx, long begin, long end, int worker)
     (void)worker;
     for (;;) {
         const long item = par_turn_take(c->turns);
-        for (long k = 0; item >= 0 && k < (item * 7919) % 2000; k++)
-            c->sink = (double)k;
+        for (volatile long k = 0; item >= 0 && k < (item * 7919) % 2000; k++)
+            continue;
         if (item >= 0 && item == c->fail) {
             par_turns_fail(c->turns, E_NOCONV);
             return E_NOCONV;
