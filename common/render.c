@@ -16,9 +16,9 @@
 #define STRIPS 8               /* of columns of the image, in each of which one thread adds */
 #define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
 
-/* Objects to draw: tall stamps first, then in order of their first row in the image, then of their number. */
+/* Objects to draw: huge pieces first, then tall stamps, then in order of their first row in the image, then of their number. */
 struct entry {
-    int row;                       /* -1: tall */
+    int row;                       /* -1: tall, -2: tall and huge */
     int part;
     unsigned int index;
 };
@@ -320,6 +320,8 @@ static void workers_free(struct worker *w, int threads)
 }
 
 /* What the entries of one pass need. */
+enum { PASSES = 3 };
+
 struct pass {
     size_t n;
     int tallest;           /* rows of the window; 0: none */
@@ -332,8 +334,8 @@ static int is_tall(const struct plan *p, const struct draw *d)
     return d->ny > TALL || (d->ny > 16 && (long)d->ny * p->view.nx > WINDOW_PIXELS) || (size_t)d->nx * (size_t)d->ny > PART_PIXELS;
 }
 
-/* Entries in drawing order: pass 0 of tall stamps, pass 1 of the others. */
-static void order(const struct plan *p, struct entry *e, struct pass pass[2])
+/* Entries in drawing order: pass 0 of huge pieces, of which one is held at a time, pass 1 of other tall stamps, pass 2 of the rest. */
+static void order(const struct plan *p, struct entry *e, struct pass pass[PASSES])
 {
     size_t n = 0;
     for (size_t i = 0; i < p->n; i++) {
@@ -341,14 +343,16 @@ static void order(const struct plan *p, struct entry *e, struct pass pass[2])
         if (d->path == PATH_NONE)
             continue;
         const int tall = is_tall(p, d), parts = parts_of(p, d, tall);
-        struct pass *q = &pass[!tall];
-        for (int k = 0; k < parts; k++) {
+        for (int k = 0; k < parts; k++, n++) {
             e[n] = (struct entry){tall ? -1 : d->y0 < 0 ? 0 : d->y0, k, (unsigned int)i};
-            const size_t need = doubles_of(p, &e[n++]);
+            const size_t need = doubles_of(p, &e[n]);
+            if (tall && need > SPACE_PIXELS / 2)
+                e[n].row = -2;
+            struct pass *q = &pass[e[n].row < 0 ? e[n].row + 2 : 2];
+            q->n++;
             q->largest = need > q->largest ? need : q->largest;
+            q->tallest = !tall && d->ny > q->tallest ? d->ny : q->tallest;
         }
-        q->n += (size_t)parts;
-        q->tallest = !tall && d->ny > q->tallest ? d->ny : q->tallest;
     }
     qsort(e, n, sizeof *e, by_row);
 }
@@ -412,14 +416,14 @@ int scene_render(const struct plan *p, struct image *im, int threads, struct pro
 {
     if (im->nx != p->view.nx || im->ny != p->view.ny || threads < 1 || threads > 256 || p->n > UINT_MAX)
         return E_RANGE;
-    struct pass pass[2] = {{0}};
-    struct entry *e = malloc((entries(p) + 1) * sizeof *e);
+    struct pass pass[PASSES] = {{0}};
+    struct entry *e = malloc((entries(p) + 1) * sizeof *e), *from = e;
     if (!e)
         return E_NOMEM;
     order(p, e, pass);
-    int st = render_pass(p, &pass[0], e, im, threads, bar);
-    if (st == OK)
-        st = render_pass(p, &pass[1], e + pass[0].n, im, threads, bar);
+    int st = OK;
+    for (int k = 0; k < PASSES && st == OK; from += pass[k++].n)
+        st = render_pass(p, &pass[k], from, im, threads, bar);
     free(e);
     return st;
 }
