@@ -204,6 +204,15 @@ static void write_used(const struct table *t, struct row_spool *spool, const str
     free(head.col);
 }
 
+/* --only-where switches every other cut off: one that was asked for must not be lost without a word. */
+static void check_only_where(const struct opt *own, const struct common *c)
+{
+    static const char *const cut[] = {"stars", "dstar", "star-prob", "star-locus", "max-ellipticity", "size-factor", "size-floor", "snr", "flags"};
+    for (size_t i = 0; i < sizeof cut / sizeof cut[0]; i++)
+        if (opt_given(own, c, cut[i]))
+            die(EXIT_USAGE, "--only-where and --%s: give the cut as --where, or leave --only-where out", cut[i]);
+}
+
 int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
@@ -230,6 +239,8 @@ int main(int argc, char **argv)
         {"mark", 0, OPT_FLAG, &p.mark, 0, 0, NULL, "keep all rows and add the column CUT", NULL, 0},
         {0}};
     opt_parse(&prog, own, &c, argc, argv);
+    if (cuts.only_where)
+        check_only_where(own, &c);
 
     struct err e;
     struct table t = {0};

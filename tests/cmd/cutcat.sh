@@ -87,6 +87,7 @@ near "NDET after two runs" "$(key twice.use NDET)" "$(grep -vc '^#' all.rrg)" 0
 printf '%s\n' '# ID NAME X' '1 a 1.5' '2 b 2.5' '3 c nan' '4 b 4' >any.txt
 fails "a catalogue without shapes" 1 cutcat any.txt --where 'X>2' -o any.out
 ok "--only-where" cutcat any.txt --only-where --where 'X>2' --where 'NAME=b' -o any.out
+fails "--only-where and another cut" 2 cutcat any.txt --only-where --snr 3
 same "keeps the rows that hold" <(col any.out ID) <(printf '2\n4\n')
 ok "--only-where on its result" cutcat any.out --only-where --where 'X<3' --mark -o any.two
 same "marks" <(col any.two CUT) <(printf '0\n16\n')
