@@ -373,9 +373,7 @@ static int run(struct job *j, long chunks, int threads)
     j->turns = par_turns_new(STRIPS, chunks);
     if (!j->turns)
         return E_NOMEM;
-    int st = threads > 1 ? par_for(j->w->im->ny, 1 + j->w->im->ny / 16, threads, touch_rows, j->w->im) : OK;
-    if (st == OK)
-        st = par_for(threads, 1, threads, draw_and_add, j);
+    int st = par_for(threads, 1, threads, draw_and_add, j);
     par_turns_free(j->turns);
     return st;
 }
@@ -421,7 +419,7 @@ int scene_render(const struct plan *p, struct image *im, int threads, struct pro
     if (!e)
         return E_NOMEM;
     order(p, e, pass);
-    int st = OK;
+    int st = threads > 1 ? par_for(im->ny, 1 + im->ny / 16, threads, touch_rows, im) : OK;
     for (int k = 0; k < PASSES && st == OK; from += pass[k++].n)
         st = render_pass(p, &pass[k], from, im, threads, bar);
     free(e);
