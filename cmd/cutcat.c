@@ -1,4 +1,5 @@
 /* cutcat.c - keep the objects that are used, and count what each cut removes. */
+#include "catkeys.h"
 #include "cuts.h"
 #include "err.h"
 #include "opt.h"
@@ -23,16 +24,19 @@ static void check(int st, const char *what)
         die(EXIT_RUN, "%s: %s", what, err_text(st));
 }
 
-static double key_or_nan(const struct table *t, const char *name)
+static double key_or_nan(const struct table *t, const char *file, const char *key)
 {
     double v;
-    return table_key_number(t, name, &v) == OK ? v : NAN;
+    struct err e;
+    if (catkeys_number(t, key, &v, &e))
+        die(EXIT_RUN, "%s: %s", file, e.text);
+    return v;
 }
 
 /* Sizes are in pixels: both files must mean the same ones (or neither say what they are). */
-static void check_scale(const char *name, const struct table *stars, const struct table *cat)
+static void check_scale(const char *name, const struct table *stars, const char *cat_name, const struct table *cat)
 {
-    const double ours = key_or_nan(cat, "PIXSCALE"), theirs = key_or_nan(stars, "PIXSCALE");
+    const double ours = key_or_nan(cat, cat_name, "PIXSCALE"), theirs = key_or_nan(stars, name, "PIXSCALE");
     if (isnan(ours) && isnan(theirs))
         return;
     if (isnan(ours) || isnan(theirs))
@@ -43,26 +47,26 @@ static void check_scale(const char *name, const struct table *stars, const struc
 }
 
 /* d* in pixels from the star-moment file, else from the catalogue's own keywords. */
-static void find_dstar(struct cuts *c, struct starmom *stars, const struct params *p, const struct table *cat,
+static void find_dstar(struct cuts *c, struct starmom *stars, const struct params *p, const char *name, const struct table *cat,
                        double max_memory)
 {
     const char *key = p->which == DSTAR_OWN ? "DSTAROWN" : "DSTAR";
     struct err e;
     c->which = (enum dstar)p->which;
-    c->dstar = key_or_nan(cat, key);
+    c->dstar = key_or_nan(cat, name, key);
     if (!p->stars)
         return;
     struct table t = {0};
     if (table_read(&t, p->stars, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    check_scale(p->stars, &t, cat);
+    check_scale(p->stars, &t, name, cat);
     if (p->which == DSTAR_EACH || c->locus_width > 0) {
         if (starmom_from_table(stars, &t, &e))
             die(EXIT_RUN, "%s: %s", p->stars, e.text);
         c->stars = stars;
     }
     if (p->which != DSTAR_EACH) {
-        c->dstar = key_or_nan(&t, key);
+        c->dstar = key_or_nan(&t, p->stars, key);
         if (!(c->dstar > 0))
             die(EXIT_RUN, "%s: no keyword %s: make the file with rrgshape --stars-only", p->stars, key);
     }
@@ -81,13 +85,12 @@ static struct cut_where *parse_where(const struct opt_strs *list)
     return w;
 }
 
-static void set_keywords(struct table *t, const struct cuts *c, const struct cut_count *n)
+static void set_keywords(struct table *t, const char *file, const struct cuts *c, const struct cut_count *n)
 {
     const struct { const char *name; double v; } key[] = {
         {"NDET", (double)n->all}, {"NSTARCUT", (double)n->stars}, {"NELLCUT", (double)n->ellipticity},
         {"NSIZECUT", (double)n->size}, {"NSNRCUT", (double)n->snr}, {"NUSED", (double)n->where}};
-    double before;
-    const int again = table_key_number(t, "NUSED", &before) == OK;    /* NDET stays the detector's count */
+    const int again = isfinite(key_or_nan(t, file, "NUSED"));    /* NDET stays the detector's count */
     for (size_t k = again ? 1 : 0; k < sizeof key / sizeof *key; k++)
         check(table_set_number(t, key[k].name, key[k].v), key[k].name);
     if (c->which == DSTAR_EACH)
@@ -254,7 +257,7 @@ int main(int argc, char **argv)
     cuts.locus_mag = p.locus[0];
     cuts.locus_width = p.locus[1];
     if (!cuts.only_where)
-        find_dstar(&cuts, &stars, &p, &t, c.max_memory);
+        find_dstar(&cuts, &stars, &p, c.argv[0], &t, c.max_memory);
     if (!c.check)
         check(row_spool_open(&spool), c.argv[0]);
     if (p.mark && !c.check && !table_find(&t, "CUT"))
@@ -265,7 +268,7 @@ int main(int argc, char **argv)
         tell(c.argv[0], &n, cuts.only_where);
     if (!c.check) {
         if (!cuts.only_where)
-            set_keywords(&t, &cuts, &n);
+            set_keywords(&t, c.argv[0], &cuts, &n);
         char *record = opt_record(&prog, own, &c);
         write_used(&t, spool, &p, &c, record);
         free(record);

@@ -86,15 +86,25 @@ static void read_pixels(struct input *in, const char *name, double max_memory)
     fits_in_close(f);
 }
 
-/* arcsec per pixel: option, header, world coordinates, catalogue; else NaN. */
-static double pixel_scale(const struct input *in, const struct exposure *x, double option)
+/* A number of a catalogue's header, NaN when there is none. */
+static double key_or_nan(const struct table *t, const char *file, const char *key)
 {
     double v;
+    struct err e;
+    if (catkeys_number(t, key, &v, &e))
+        die(EXIT_RUN, "%s: %s", file, e.text);
+    return v;
+}
+
+/* arcsec per pixel: option, header, world coordinates, catalogue; else NaN. */
+static double pixel_scale(const struct input *in, const char *cat, const struct exposure *x, double option)
+{
+    const double v = key_or_nan(&in->cat, cat, "PIXSCALE");
+    if (v <= 0)
+        die(EXIT_RUN, "%s: keyword PIXSCALE = %g is not positive: correct it", cat, v);
     if (option > 0)
         return option;
-    if (isfinite(x->scale))
-        return x->scale;
-    return table_key_number(&in->cat, "PIXSCALE", &v) == OK && v > 0 ? v : NAN;
+    return isfinite(x->scale) ? x->scale : v;
 }
 
 static void read_map(struct image *im, const struct input *in, const char *name, double max_memory)
@@ -131,7 +141,7 @@ static void read_input(struct input *in, const char *image, const char *cat, con
         read_map(&in->label, in, label, max_memory);
         in->map.label = in->label.pix;
     }
-    in->scale = pixel_scale(in, &x, p->scale);
+    in->scale = pixel_scale(in, cat, &x, p->scale);
 }
 
 static void free_input(struct input *in)
@@ -198,15 +208,14 @@ static void read_curve(struct starmom *s, const char *name, const struct input *
 {
     struct err e;
     struct table t = {0};
-    double scale;
     if (table_read(&t, name, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     if (starmom_from_table(s, &t, &e))
         fail(name, &e);
-    if (table_key_number(&t, "PIXSCALE", &scale) == OK && isfinite(in->scale) && !(fabs(scale / in->scale - 1) < 1e-6))
+    const double scale = key_or_nan(&t, name, "PIXSCALE");
+    if (isfinite(scale) && isfinite(in->scale) && !(fabs(scale / in->scale - 1) < 1e-6))
         die(EXIT_RUN, "%s: star moments for pixels of %g arcsec, but %s has %g", name, scale, in->name, in->scale);
-    if (table_key_number(&t, "DSTAROWN", own) != OK)
-        *own = NAN;
+    *own = key_or_nan(&t, name, "DSTAROWN");
     table_free(&t);
 }
 

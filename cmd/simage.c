@@ -4,6 +4,7 @@
  * Noise-free: addnoise draws.  The positions of the list are not sheared; the
  * shapes are, about each object's origin.
  */
+#include "catkeys.h"
 #include "distort.h"
 #include "emit.h"
 #include "err.h"
@@ -181,7 +182,10 @@ static void set_size(const struct input *in, const struct request *r, const char
         side[0] = (double)in->nx;
         side[1] = (double)in->ny;
     } else if (!(side[0] > 0)) {
-        if (table_key_number(&in->list, "FIELD", &field) || !(field > 0))
+        struct err e;
+        if (catkeys_number(&in->list, "FIELD", &field, &e))
+            die(EXIT_RUN, "%s: %s", name, e.text);
+        if (!(field > 0))
             die(EXIT_USAGE, "%s: no keyword FIELD: give --size NX,NY in output pixels", name);
         double n = fmax(1, rint(field / r->pixel));
         side[0] = side[1] = (double)r->subpixel * n + (double)r->subpixel - 1;

@@ -1,5 +1,6 @@
-/* catkeys.c - keywords that go from an image to the catalogues made of it. */
+/* catkeys.c - keywords of catalogues: those that come from their image, and numbers among them. */
 #include "catkeys.h"
+#include <math.h>
 #include <string.h>
 
 static int copy_one(struct table *t, const struct header *h, const char *key)
@@ -22,6 +23,15 @@ int catkeys_copy(struct table *t, const struct header *h)
     for (size_t i = 0; i < sizeof keys / sizeof *keys && st == OK; i++)
         st = copy_one(t, h, keys[i]);
     return st;
+}
+
+int catkeys_number(const struct table *t, const char *key, double *value, struct err *e)
+{
+    const char *text = table_text(t, key);
+    *value = NAN;
+    if (!text || strcmp(text, "nan") == 0 || table_key_number(t, key, value) == OK)
+        return OK;
+    return err_set(e, E_DATA, "keyword %s = '%.60s' is not a number: correct it", key, text);
 }
 
 int catkeys_history(struct table *t, const struct header *h)

@@ -1,5 +1,6 @@
 /* fomcat.c - what the figures of merit need of a shape catalogue; common objects. */
 #include "fomcat.h"
+#include "catkeys.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,26 +23,29 @@ static int read_keywords(struct fom_image *im, const struct table *t, struct err
     copy_word(im->set, table_text(t, "SETNAME"), "-");
     copy_word(im->sky, table_text(t, "FIELDID") ? table_text(t, "FIELDID") : table_text(t, "SEED"), "-");
     const char *noise = table_text(t, "NOISSEED");
-    double mirror;
-    int opposite = table_key_number(t, "MIRROR", &mirror) == OK && mirror > 0;
-    snprintf(im->field, sizeof im->field, "%s:%.40s%s", im->sky, noise ? noise : "", opposite ? "~" : "");
+    double mirror, pixel;
+    const struct { const char *key; double *value; } want[] = {
+        {"MIRROR", &mirror}, {"SHEAR1", &im->g[0]}, {"SHEAR2", &im->g[1]}, {"CCDSCALE", &im->scale}, {"PIXSCALE", &pixel},
+        {"EPSF1", &im->epsf[0]}, {"EPSF2", &im->epsf[1]}, {"AREA", &im->area}};
+    int st = OK;
+    for (size_t i = 0; i < sizeof want / sizeof *want && st == OK; i++)
+        st = catkeys_number(t, want[i].key, want[i].value, e);
+    for (int k = 0; k < 5 && st == OK; k++)
+        st = catkeys_number(t, count[k], &im->count[k], e);
+    if (st)
+        return st;
+    snprintf(im->field, sizeof im->field, "%s:%.40s%s", im->sky, noise ? noise : "", mirror > 0 ? "~" : "");
     for (int k = 0; k < 2; k++)
-        if (table_key_number(t, k ? "SHEAR2" : "SHEAR1", &im->g[k]) != OK)
+        if (isnan(im->g[k]))
             return err_set(e, E_MISSING, "no keyword SHEAR%d: shapes must be measured on an image that has it", k + 1);
-    if (table_key_number(t, "CCDSCALE", &im->scale) != OK && table_key_number(t, "PIXSCALE", &im->scale) != OK)
+    if (isnan(im->scale))
+        im->scale = pixel;
+    if (isnan(im->scale))
         return err_set(e, E_MISSING, "no keyword CCDSCALE or PIXSCALE");
-    im->area = im->epsf[0] = im->epsf[1] = NAN;
-    double v;
-    for (int k = 0; k < 2; k++)
-        if (table_key_number(t, k ? "EPSF2" : "EPSF1", &v) == OK)
-            im->epsf[k] = v;
-    if (table_key_number(t, "AREA", &v) == OK && v > 0)
-        im->area = v;
-    for (int k = 0; k < 5; k++) {
-        im->count[k] = NAN;
-        if (table_key_number(t, count[k], &v) == OK)
-            im->count[k] = v;
-    }
+    if (!(im->scale > 0))
+        return err_set(e, E_DATA, "keyword CCDSCALE or PIXSCALE is %g: it must be positive", im->scale);
+    if (im->area <= 0)
+        return err_set(e, E_DATA, "keyword AREA = %g is not positive: correct it", im->area);
     return OK;
 }
 
@@ -129,8 +133,8 @@ static int find_key(struct used *u, const struct table *t, const char *key, stru
     if (st == OK && u->ratio)
         st = need(t, "FLUXERR_AUTO", " for the bins", &u->key[1], e);
     u->key_px = 1;
-    if (st == OK && size && table_key_number(t, "PIXSCALE", &u->key_px) != OK)
-        return err_set(e, E_MISSING, "no keyword PIXSCALE for bins of SIZE");
+    if (st == OK && size && (table_key_number(t, "PIXSCALE", &u->key_px) != OK || !(u->key_px > 0)))
+        return err_set(e, E_MISSING, "no PIXSCALE above 0 for bins of SIZE");
     return st;
 }
 
@@ -149,8 +153,8 @@ static int find_columns(struct used *u, int *on_sky, const struct table *t, cons
     u->y = *on_sky ? dec : table_find(t, "Y_IMAGE");
     if (!u->x || !u->y)
         return err_set(e, E_MISSING, "no positions: columns ALPHA_J2000 DELTA_J2000 or X_IMAGE Y_IMAGE");
-    if (!*on_sky && table_key_number(t, "PIXSCALE", &u->px) != OK)
-        return err_set(e, E_MISSING, "no keyword PIXSCALE and no sky positions");
+    if (!*on_sky && (table_key_number(t, "PIXSCALE", &u->px) != OK || !(u->px > 0)))
+        return err_set(e, E_MISSING, "no PIXSCALE above 0 and no sky positions");
     u->cut = table_find(t, "CUT");
     return key && strcmp(key, "DISTANCE") != 0 ? find_key(u, t, key, e) : OK;
 }

@@ -1,5 +1,6 @@
 /* shapecat.c - shapes of a catalogue of objects on an image. */
 #include "shapecat.h"
+#include "catkeys.h"
 #include "par.h"
 #include "stats.h"
 #include <math.h>
@@ -385,7 +386,7 @@ static void star_errors(struct starmom *s, const struct table *t)
 
 int starmom_from_table(struct starmom *s, const struct table *t, struct err *e)
 {
-    struct starmom r = {.dstar = NAN, .dstar_err = NAN, .dstar_w = NAN};
+    struct starmom r = {0};
     const double *w = table_reals(t, "WIDTH");
     if (!w || t->nrow < 4 || t->nrow > STARMOM_MAX)
         return err_set(e, E_DATA, "not a star-moment file (column WIDTH, 4 to %d rows): make one with rrgshape --stars-only",
@@ -399,13 +400,13 @@ int starmom_from_table(struct starmom *s, const struct table *t, struct err *e)
     }
     memcpy(r.w, w, t->nrow * sizeof *w);
     star_errors(&r, t);
-    double v;
-    if (table_key_number(t, "DSTAR", &v) == OK)
-        r.dstar = v;
-    if (table_key_number(t, "DSTARERR", &v) == OK)
-        r.dstar_err = v;
-    if (table_key_number(t, "DSTARW", &v) == OK)
-        r.dstar_w = v;
+    int st = catkeys_number(t, "DSTAR", &r.dstar, e);
+    if (st == OK)
+        st = catkeys_number(t, "DSTARERR", &r.dstar_err, e);
+    if (st == OK)
+        st = catkeys_number(t, "DSTARW", &r.dstar_w, e);
+    if (st)
+        return st;
     if (starmom_prepare(&r) != OK)
         return err_set(e, E_DATA, "widths do not rise, or a moment is not a number");
     *s = r;
