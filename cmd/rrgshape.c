@@ -104,6 +104,9 @@ static double pixel_scale(const struct input *in, const char *cat, const struct 
         die(EXIT_RUN, "%s: keyword PIXSCALE = %g is not positive: correct it", cat, v);
     if (option > 0)
         return option;
+    /* positions count pixels: those of another scale are not on these objects */
+    if (isfinite(x->scale) && isfinite(v) && !(fabs(v / x->scale - 1) <= 1e-3))
+        die(EXIT_RUN, "%s: a catalogue of pixels of %g arcsec, but %s has %g: give the catalogue of this image", cat, v, in->name, x->scale);
     return isfinite(x->scale) ? x->scale : v;
 }
 
@@ -203,6 +206,17 @@ static void measure_stars(struct starmom *s, const struct input *in, const char 
     free(stars);
 }
 
+/* The moments of stars are in pixels: both files must mean the same ones, or neither say what they are. */
+static void same_pixels(const char *name, double scale, const struct input *in)
+{
+    if (isnan(scale) && isfinite(in->scale))
+        die(EXIT_RUN, "%s: no PIXSCALE: stars in unknown pixels, but %s has %g arcsec: add the keyword", name, in->name, in->scale);
+    if (isfinite(scale) && isnan(in->scale))
+        die(EXIT_RUN, "%s: stars in pixels of %g arcsec, but %s tells none: give --pixscale", name, scale, in->name);
+    if (isfinite(scale) && !(fabs(scale / in->scale - 1) < 1e-6))
+        die(EXIT_RUN, "%s: stars in pixels of %g arcsec, but %s has %g", name, scale, in->name, in->scale);
+}
+
 /* A star-moment file; its pixels must be those of the image. */
 static void read_curve(struct starmom *s, const char *name, const struct input *in, double max_memory, double *own)
 {
@@ -212,9 +226,7 @@ static void read_curve(struct starmom *s, const char *name, const struct input *
         die(EXIT_RUN, "%s", e.text);
     if (starmom_from_table(s, &t, &e))
         fail(name, &e);
-    const double scale = key_or_nan(&t, name, "PIXSCALE");
-    if (isfinite(scale) && isfinite(in->scale) && !(fabs(scale / in->scale - 1) < 1e-6))
-        die(EXIT_RUN, "%s: star moments for pixels of %g arcsec, but %s has %g", name, scale, in->name, in->scale);
+    same_pixels(name, key_or_nan(&t, name, "PIXSCALE"), in);
     *own = key_or_nan(&t, name, "DSTAROWN");
     table_free(&t);
 }
@@ -266,8 +278,7 @@ static struct starmom *find_psf(struct starmom *s, const struct input *in, const
     }
     struct input stars;
     read_input(&stars, p->star_image, p->star_cat, p, NULL, NULL, c->max_memory);
-    if (isfinite(in->scale) && !(fabs(stars.scale / in->scale - 1) < 1e-6))
-        die(EXIT_RUN, "%s: pixels of %g arcsec, but %s has %g", p->star_image, stars.scale, in->name, in->scale);
+    same_pixels(p->star_image, stars.scale, in);
     measure_stars(s, &stars, p->star_cat, p, c->threads, own);
     free_input(&stars);
     return s;

@@ -34,3 +34,23 @@ for v in 0 -1; do
     sed "s/^# Keyword: AREA = .*/# Keyword: AREA = $v/" use.txt >low.txt; fails "AREA = $v" 1 fom low.txt
 done
 sed 's/^# Keyword: PIXSCALE = .*/# Keyword: PIXSCALE = -0.1/' cat.txt >low.txt; fails "PIXSCALE = -0.1 in a catalogue" 1 rrgshape noisy.fits low.txt --psf none
+
+# pixels of what scale: a catalogue or stars of another image's pixels, and stars that do not say of which
+scaled() { sed "s/^\(# Keyword: PIXSCALE = \).*/\1$2/" "$1"; }
+bare() { grep -v "^# Keyword: PIXSCALE" "$1"; }
+scaled cat.txt 0.05 >cat.05; bare cat.txt >cat.none; scaled stars.rrg 0.05 >stars.05; bare stars.rrg >stars.none; bare scat.txt >scat.none; scaled scat.txt 0.05 >scat.05
+perl -pe "s/PIXSCALE= /HIDDEN  = /; s/CTYPE1  /CTYPX1  /; s/CTYPE2  /CTYPX2  /" noisy.fits >none.fits
+if cmp -s none.fits noisy.fits; then fail "none.fits has still its scale"; fi
+fails "a catalogue of other pixels" 1 rrgshape noisy.fits cat.05 --psf none
+fails "stars' catalogue of other pixels" 1 rrgshape noisy.fits cat.txt --stars stars.fits,scat.05
+fails "star moments of other pixels" 1 rrgshape noisy.fits cat.txt --stars stars.05
+fails "star moments that do not say of which pixels" 1 rrgshape noisy.fits cat.txt --stars stars.none
+fails "star moments, and an image that does not say of which pixels" 1 rrgshape none.fits cat.none --fixed-width 2 --stars stars.rrg
+fails "stars' image, and one that does not say of which pixels" 1 rrgshape none.fits cat.none --fixed-width 2 --stars stars.fits,scat.txt
+ok "nobody tells: moments in pixels" rrgshape none.fits cat.none --fixed-width 2 --stars stars.none -o pixels.txt
+rrgshape noisy.fits cat.txt --fixed-width 2 --stars stars.rrg -o known.txt
+same "and they are the same" <(col pixels.txt E1) <(col known.txt E1)
+rrgshape none.fits cat.none -x 0.1 --fixed-width 2 --stars stars.rrg -o known.two; same "or --pixscale tells" <(col known.two E1) <(col known.txt E1)
+# Source Extractor's catalogues have no PIXSCALE; the image knows it
+rrgshape noisy.fits cat.none --stars stars.fits,scat.none -o known.one; rrgshape noisy.fits cat.txt --stars stars.fits,scat.txt -o known.two
+same "catalogues without PIXSCALE are of their image's pixels" <(col known.one E1) <(col known.two E1)
