@@ -1,7 +1,78 @@
-/* par.c - parallel for over chunks of items. */
+/*
+ * par.c - parallel for over chunks of items.
+ *
+ * A thread that is made or woken often waits on its maker's processor until the system balances its load, ticks of 4 ms
+ * later, while another processor has nothing to do.  So it is sent away at once: for a moment it may run everywhere but there.
+ */
 #include "par.h"
 #include <pthread.h>
+#include <sched.h>
 #include <stdlib.h>
+
+/* ---- processors ---- */
+
+#ifdef CPU_COUNT
+struct places {
+    cpu_set_t all, others;    /* of this program; without the caller's */
+    int here, known;          /* the caller's; 0: there is no other one */
+};
+
+static void places_find(struct places *p)
+{
+    p->here = sched_getcpu();
+    p->known = p->here >= 0 && p->here < CPU_SETSIZE && sched_getaffinity(0, sizeof p->all, &p->all) == 0
+            && CPU_ISSET((size_t)p->here, &p->all) && CPU_COUNT(&p->all) > 1;
+    if (!p->known)
+        return;
+    p->others = p->all;
+    CPU_CLR((size_t)p->here, &p->others);
+}
+
+/* Send a thread that last ran on processor `last` (-1: not yet) away from the caller's; 1: it has to call places_free. */
+static int places_send(const struct places *p, pthread_t thread, int last)
+{
+    return p->known && (last < 0 || last == p->here) && pthread_setaffinity_np(thread, sizeof p->others, &p->others) == 0;
+}
+
+static void places_free(const struct places *p)
+{
+    (void)pthread_setaffinity_np(pthread_self(), sizeof p->all, &p->all);
+}
+
+static int this_place(void)
+{
+    return sched_getcpu();
+}
+#else
+struct places {
+    int known;
+};
+
+static void places_find(struct places *p)
+{
+    p->known = 0;
+}
+
+static int places_send(const struct places *p, pthread_t thread, int last)
+{
+    (void)p;
+    (void)thread;
+    (void)last;
+    return 0;
+}
+
+static void places_free(const struct places *p)
+{
+    (void)p;
+}
+
+static int this_place(void)
+{
+    return -1;
+}
+#endif
+
+/* ---- the work ---- */
 
 struct pool {
     pthread_mutex_t lock;
@@ -10,11 +81,13 @@ struct pool {
     long failed_at;
     par_body *body;
     void *ctx;
+    struct places places;
 };
 
 struct worker {
     struct pool *pool;
     int id;
+    int begun, sent;          /* runs; was sent to another processor before */
 };
 
 static int take(struct pool *p, long *begin, long *end)
@@ -49,12 +122,38 @@ static void *work(void *arg)
     return NULL;
 }
 
+/* A thread made for one loop. */
+static void *begin(void *arg)
+{
+    struct worker *w = arg;
+    pthread_mutex_lock(&w->pool->lock);
+    w->begun = 1;
+    const int sent = w->sent;
+    pthread_mutex_unlock(&w->pool->lock);
+    if (sent)
+        places_free(&w->pool->places);
+    return work(w);
+}
+
+static int make_thread(struct worker *w, pthread_t *id)
+{
+    struct pool *p = w->pool;
+    if (pthread_create(id, NULL, begin, w))
+        return 0;
+    pthread_mutex_lock(&p->lock);
+    if (!w->begun)
+        w->sent = places_send(&p->places, *id, -1);
+    pthread_mutex_unlock(&p->lock);
+    return 1;
+}
+
 /* ---- threads that stay ---- */
 
 struct member {
     struct par_team *team;
     int id;
     pthread_t thread;
+    int last, sent;           /* the processor it waits on, -1: not there yet; was sent to another one */
 };
 
 struct par_team {
@@ -63,6 +162,7 @@ struct par_team {
     pthread_mutex_t lock;
     pthread_cond_t start, done;
     struct pool *pool;        /* what to work on */
+    struct places places;
     unsigned long turn;       /* counts loops */
     int busy, stop;
 };
@@ -71,17 +171,23 @@ static void *serve(void *arg)
 {
     struct member *me = arg;
     struct par_team *t = me->team;
-    struct worker self = {NULL, me->id};
+    struct worker self = {.id = me->id};
     unsigned long seen = 0;
     pthread_mutex_lock(&t->lock);
     for (;;) {
+        me->last = this_place();
         while (t->turn == seen && !t->stop)
             pthread_cond_wait(&t->start, &t->lock);
         if (t->stop)
             break;
         seen = t->turn;
         self.pool = t->pool;
+        const int sent = me->sent;
+        const struct places places = t->places;
+        me->sent = 0;
         pthread_mutex_unlock(&t->lock);
+        if (sent)
+            places_free(&places);
         work(&self);
         pthread_mutex_lock(&t->lock);
         if (--t->busy == 0)
@@ -105,12 +211,13 @@ int par_for(long n, long chunk, int threads, par_body *body, void *ctx)
         threads = n > 0 ? (int)((n + chunk - 1) / chunk) : 1;
 
     int made = 0;
+    if (threads > 1)
+        places_find(&p.places);
     for (int t = 1; t < threads; t++) {
-        self[made + 1] = (struct worker){&p, made + 1};
-        if (pthread_create(&id[made], NULL, work, &self[made + 1]) == 0)
-            made++;
+        self[made + 1] = (struct worker){.pool = &p, .id = made + 1};
+        made += make_thread(&self[made + 1], &id[made]);
     }
-    self[0] = (struct worker){&p, 0};
+    self[0] = (struct worker){.pool = &p};
     work(&self[0]);
     for (int t = 0; t < made; t++)
         pthread_join(id[t], NULL);
@@ -128,7 +235,7 @@ struct par_team *par_team_new(int threads)
         return NULL;
     }
     for (int k = 0; k < threads - 1; k++) {
-        t->member[k] = (struct member){.team = t, .id = k + 1};
+        t->member[k] = (struct member){.team = t, .id = k + 1, .last = -1};
         if (pthread_create(&t->member[k].thread, NULL, serve, &t->member[k]))
             break;
         t->made++;
@@ -141,7 +248,7 @@ int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void
     if (n < 0 || chunk < 1)
         return E_RANGE;
     struct pool p = {.n = n, .chunk = chunk, .body = body, .ctx = ctx};
-    struct worker self = {&p, 0};
+    struct worker self = {.pool = &p};
     if (pthread_mutex_init(&p.lock, NULL))
         return E_NOMEM;
     const int others = team && n > chunk ? team->made : 0;
@@ -150,6 +257,9 @@ int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void
         team->pool = &p;
         team->busy = others;
         team->turn++;
+        places_find(&team->places);
+        for (int k = 0; k < others; k++)
+            team->member[k].sent |= places_send(&team->places, team->member[k].thread, team->member[k].last);
         pthread_cond_broadcast(&team->start);
         pthread_mutex_unlock(&team->lock);
     }

@@ -1,6 +1,7 @@
 /* test_par.c - loops on threads: every item once, failures end them, and turns are kept whoever works. */
 #include "check.h"
 #include "par.h"
+#include <sched.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -73,8 +74,47 @@ static int in_order(const struct chain *c, long n)
     return good;
 }
 
+#ifdef CPU_COUNT
+struct masks {
+    cpu_set_t mask[2];
+    int met[2];                    /* worker's were here */
+};
+
+/* Waits until both workers have come, and notes where this one may run. */
+static int note_mask(void *ctx, long begin, long end, int worker)
+{
+    struct masks *m = ctx;
+    (void)begin;
+    (void)end;
+    int st = sched_getaffinity(0, sizeof m->mask[0], &m->mask[worker]) ? E_IO : OK;
+    __atomic_store_n(&m->met[worker], 1, __ATOMIC_RELEASE);
+    while (!st && !__atomic_load_n(&m->met[1 - worker], __ATOMIC_ACQUIRE))
+        sched_yield();
+    return st;
+}
+
+/* A thread is sent to another processor when it starts, but not kept from any: it may run where its maker may. */
+static void masks_stay(void)
+{
+    cpu_set_t mine;
+    struct par_team *team = par_team_new(2);
+    int good = sched_getaffinity(0, sizeof mine, &mine) == 0, kept = 1;
+    for (int k = 0; k < 40 && good; k++) {
+        struct masks m;
+        memset(&m, 0, sizeof m);
+        good = (k % 2 ? par_team_for(team, 2, 1, note_mask, &m) : par_for(2, 1, 2, note_mask, &m)) == OK;
+        kept &= CPU_EQUAL(&mine, &m.mask[0]) && CPU_EQUAL(&mine, &m.mask[1]);
+    }
+    par_team_free(team);
+    check_that(good && kept, "threads may run wherever their maker may, in 20 loops of new ones and 20 of those that stay");
+}
+#endif
+
 int main(void)
 {
+#ifdef CPU_COUNT
+    masks_stay();
+#endif
     static int times[N];
     for (int threads = 1; threads <= 5; threads += 2) {
         memset(times, 0, sizeof times);
