@@ -234,6 +234,7 @@ int main(int argc, char **argv)
     size_t groups = group_all(n, im, &bins, &o, r);
     check_reference(&o, groups, r);
     check(fom_compare(groups, r, &o), "lines over scales");
+    check(fom_contrast(groups, r, &o), "errors against the reference");
     check(fom_optimum(groups, r, &o), "best scale");
     if (c.check) {
         warn("%zu catalogues in %zu groups", n, groups);

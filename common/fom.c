@@ -24,16 +24,16 @@
     {"CPAIR" c "SE", "", "its standard error"}
 
 const struct fom_text fom_column[FOM_QUANTITIES] = {
-    {"N_DET", "arcmin-2", "detected objects"},
-    {"N_STARCUT", "arcmin-2", "left after the star cut"},
-    {"N_ELLCUT", "arcmin-2", "left after the ellipticity cut"},
-    {"N_SIZECUT", "arcmin-2", "left after the size cut"},
-    {"N_SNRCUT", "arcmin-2", "left after the signal-to-noise cut"},
+    {"N_DET", "arcmin-2", "detected objects"}, {"N_DETERR", "arcmin-2", "its spread over the images"},
+    {"N_STARCUT", "arcmin-2", "left after the star cut"}, {"N_STARCUTERR", "arcmin-2", "its spread over the images"},
+    {"N_ELLCUT", "arcmin-2", "left after the ellipticity cut"}, {"N_ELLCUTERR", "arcmin-2", "its spread over the images"},
+    {"N_SIZECUT", "arcmin-2", "left after the size cut"}, {"N_SIZECUTERR", "arcmin-2", "its spread over the images"},
+    {"N_SNRCUT", "arcmin-2", "left after the signal-to-noise cut"}, {"N_SNRCUTERR", "arcmin-2", "its spread over the images"},
     {"N_GAL", "arcmin-2", "galaxies used"},
     {"N_GALERR", "arcmin-2", "its spread over the images"},
     {"N_EFF", "arcmin-2", "effective number for equal weights"},
     {"G", "", "mean response"},
-    {"SIGMA_E", "", "spread of the ellipticity"},
+    {"SIGMA_E", "", "spread of the ellipticity"}, {"SIGMA_EERR", "", "its standard error"},
     {"B1", "", "slope of shear 1, fit"}, {"B1SE", "", "its standard error"}, {"B1JK", "", "its error by leaving out skies"},
     {"A1", "", "intercept of shear 1"}, {"A1SE", "", "its standard error"}, {"CHISQ1", "", "chi squared of the fit"},
     {"B2", "", "slope of shear 2, fit"}, {"B2SE", "", "its standard error"}, {"B2JK", "", "its error by leaving out skies"},
@@ -56,6 +56,7 @@ const struct fom_text fom_column[FOM_QUANTITIES] = {
     {"LINE2", "", "slope 2 on the line"}, {"LINE2A", "", "line: slope at scale 0"}, {"LINE2ASE", "", "its standard error"},
     {"LINE2B", "arcsec-1", "line: change with scale"}, {"LINE2BSE", "arcsec-1", "its standard error"},
     {"LOGDC", "", "log10 of the power spectrum error"}, {"LOGDCERR", "", "its standard error"},
+    {"LOGDCBS", "", "its bootstrap error against the reference"},
     {"OPTSCALE", "arcsec", "scale of the least power spectrum error of the set"}, {"OPTSCALEERR", "arcsec", "its bootstrap error"},
 };
 
@@ -82,6 +83,7 @@ static int densities(struct group *s)
             per[i] = s->im[i]->count[k] / s->im[i]->area;
         stats_sum(s->n, per, &t);
         s->v[to[k]] = t.mean;
+        s->v[to[k] + 1] = s->n > 1 ? sqrt(t.var) : sqrt(s->im[0]->count[k]) / s->im[0]->area;
     }
     for (size_t i = 0; i < s->n; i++) {
         per[i] = (double)fom_image_used(s->im[i]) / s->im[i]->area;
@@ -383,6 +385,18 @@ static size_t count_fields(size_t n, const struct fom_image *const *im)
     return fields;
 }
 
+/* Galaxies of all fields, each counted once. */
+static double independent(const struct fom_result *r)
+{
+    return r->v[FOM_N_GAL] * r->area * (double)r->fields;
+}
+
+/* Variance of s1 + s2, the variances of both components: s^2 (kurtosis + 2)/n each. */
+static double spread_variance(const struct fom_result *r, double s1, double s2)
+{
+    return (s1 * s1 * (r->v[FOM_KURT1] + 2) + s2 * s2 * (r->v[FOM_KURT2] + 2)) / independent(r);
+}
+
 int fom_group(size_t n, const struct fom_image *const *im, const struct fom_options *o, struct fom_result *r)
 {
     if (n < 1 || o->draws < 0 || !(o->radius > 0))
@@ -412,6 +426,7 @@ int fom_group(size_t n, const struct fom_image *const *im, const struct fom_opti
         return st;
     }
     out.v[FOM_SIGMA_E] = sqrt(var_e[0] + var_e[1]);
+    out.v[FOM_SIGMA_EERR] = sqrt(spread_variance(&out, var_e[0], var_e[1])) / (2 * out.v[FOM_SIGMA_E]);
     effective(&s, var_e);
     *r = out;
     return OK;
@@ -480,23 +495,19 @@ static int line_of_set(size_t n, struct fom_result *r, const struct fom_result *
 static void corrected_spread(struct fom_result *r)
 {
     double *v = r->v, s1 = v[FOM_SIGMA1] / v[FOM_L1], s2 = v[FOM_SIGMA2] / v[FOM_L2];
-    /* var(s^2) = s^4 (kurtosis + 2)/n, n: galaxies of all fields, each counted once */
-    double n = v[FOM_N_GAL] * r->area * (double)r->fields;
-    double var = (pow(s1, 4) * (v[FOM_KURT1] + 2) + pow(s2, 4) * (v[FOM_KURT2] + 2)) / n;
     v[FOM_SIGMA] = sqrt(s1 * s1 + s2 * s2);
-    v[FOM_SIGMAERR] = sqrt(var) / (2 * v[FOM_SIGMA]);
+    v[FOM_SIGMAERR] = sqrt(spread_variance(r, s1 * s1, s2 * s2)) / (2 * v[FOM_SIGMA]);
     v[FOM_STDERR] = v[FOM_SIGMA] / sqrt(v[FOM_N_GAL]);
     v[FOM_STDERRERR] = v[FOM_STDERR] * hypot(v[FOM_SIGMAERR] / v[FOM_SIGMA], 0.5 * v[FOM_N_GALERR] / v[FOM_N_GAL]);
 }
 
-/* The value that of `of` is divided by: of the reference set and scale, in the same bin. */
-static double reference(size_t n, const struct fom_result *r, const struct fom_result *of, const struct fom_options *o)
+const struct fom_result *fom_reference(size_t n, const struct fom_result *r, const struct fom_result *of, const struct fom_options *o)
 {
     for (size_t i = 0; i < n; i++)
         if ((!o->ref_set || strcmp(o->ref_set, r[i].set) == 0) && fabs(r[i].scale - o->ref_scale) < 1e-6 &&
             (r[i].lo == of->lo || (isnan(r[i].lo) && isnan(of->lo))))
-            return r[i].v[FOM_LOGDC];
-    return NAN;
+            return &r[i];
+    return NULL;
 }
 
 int fom_compare(size_t n, struct fom_result *r, const struct fom_options *o)
@@ -521,8 +532,10 @@ int fom_compare(size_t n, struct fom_result *r, const struct fom_options *o)
     double *ref = calloc(n + 1, sizeof *ref);
     if (!ref)
         return E_NOMEM;
-    for (size_t i = 0; i < n; i++)
-        ref[i] = reference(n, r, &r[i], o);
+    for (size_t i = 0; i < n; i++) {
+        const struct fom_result *to = fom_reference(n, r, &r[i], o);
+        ref[i] = to ? to->v[FOM_LOGDC] : NAN;
+    }
     for (size_t i = 0; i < n; i++) {
         double *v = r[i].v, ds = v[FOM_SIGMAERR] / v[FOM_SIGMA], dn = v[FOM_N_GALERR] / v[FOM_N_GAL];
         v[FOM_LOGDC] = log10(v[FOM_LOGDC] / ref[i]);

@@ -31,8 +31,9 @@ struct fom_options {
 
 /* Columns of the result after SETNAME CCDSCALE NIMAGES NFIELDS; fom_column[] describes them. */
 enum fom_quantity {
-    FOM_N_DET, FOM_N_STARCUT, FOM_N_ELLCUT, FOM_N_SIZECUT, FOM_N_SNRCUT, FOM_N_GAL, FOM_N_GALERR, FOM_N_EFF,
-    FOM_G, FOM_SIGMA_E,
+    FOM_N_DET, FOM_N_DETERR, FOM_N_STARCUT, FOM_N_STARCUTERR, FOM_N_ELLCUT, FOM_N_ELLCUTERR, FOM_N_SIZECUT, FOM_N_SIZECUTERR,
+    FOM_N_SNRCUT, FOM_N_SNRCUTERR, FOM_N_GAL, FOM_N_GALERR, FOM_N_EFF,
+    FOM_G, FOM_SIGMA_E, FOM_SIGMA_EERR,
     FOM_B1, FOM_B1SE, FOM_B1JK, FOM_A1, FOM_A1SE, FOM_CHI1, FOM_B2, FOM_B2SE, FOM_B2JK, FOM_A2, FOM_A2SE, FOM_CHI2, FOM_DOF,
     FOM_SIGMA1, FOM_SIGMA2, FOM_SIGMA, FOM_SIGMAERR, FOM_STDERR, FOM_STDERRERR,
     FOM_SKEW1, FOM_SKEW1ERR, FOM_KURT1, FOM_KURT1ERR, FOM_SKEW2, FOM_SKEW2ERR, FOM_KURT2, FOM_KURT2ERR,
@@ -40,7 +41,7 @@ enum fom_quantity {
     FOM_PAIRS2, FOM_BP2, FOM_BP2SE, FOM_BP2JK, FOM_BP2BS, FOM_BP2BK, FOM_BT2, FOM_BT2SE, FOM_BT2BK, FOM_CP2, FOM_CP2SE,
     FOM_SEL1, FOM_SEL1SE, FOM_TOT1, FOM_TOT1SE, FOM_SEL2, FOM_SEL2SE, FOM_TOT2, FOM_TOT2SE,
     FOM_L1, FOM_L1A, FOM_L1ASE, FOM_L1B, FOM_L1BSE, FOM_L2, FOM_L2A, FOM_L2ASE, FOM_L2B, FOM_L2BSE,
-    FOM_LOGDC, FOM_LOGDCERR, FOM_OPT, FOM_OPTERR,
+    FOM_LOGDC, FOM_LOGDCERR, FOM_LOGDCBS, FOM_OPT, FOM_OPTERR,
     FOM_QUANTITIES
 };
 
@@ -81,6 +82,15 @@ MUST_CHECK int fom_group(size_t n, const struct fom_image *const *im, const stru
  * After fom_compare().
  */
 MUST_CHECK int fom_optimum(size_t n, struct fom_result *r, const struct fom_options *o);
+
+/*
+ * LOGDCBS, the error of LOGDC: spread of the difference to the reference over the same draws of blocks of sky, in all
+ * sets at once, so that what galaxies in common share cancels (0 for the reference itself).  The slopes stay as they are.  After fom_compare().
+ */
+MUST_CHECK int fom_contrast(size_t n, struct fom_result *r, const struct fom_options *o);
+
+/* What `of` is compared with: the reference set and scale, in the same bin; NULL: not there. */
+const struct fom_result *fom_reference(size_t n, const struct fom_result *r, const struct fom_result *of, const struct fom_options *o);
 
 /*
  * Lines b = a + slope * CCDSCALE through the slopes of each set (three scales

@@ -1,4 +1,4 @@
-/* fomopt.c - the pixel scale of the least power spectrum error, and how well it is known. */
+/* fomopt.c - how well the power spectrum error is known against the reference, and the pixel scale where it is least. */
 #include "fom.h"
 #include "stats.h"
 #include <math.h>
@@ -7,9 +7,9 @@
 
 #define LEAST_SCALES 4
 
-/* One set: its scales in rising order, and the blocks of sky they share. */
+/* One set, its scales in rising order, or all sets; and the blocks of sky they share. */
 struct curve {
-    size_t n;                 /* scales */
+    size_t n, room;           /* scales of the set, or groups; how many the arrays hold */
     const struct fom_result **r;
     uint32_t **label;         /* of every block of every scale, 0..labels-1 */
     size_t labels;
@@ -22,9 +22,32 @@ static int by_scale(const void *a, const void *b)
     return (*p)->scale < (*q)->scale ? -1 : (*p)->scale > (*q)->scale;
 }
 
+static int same_bin(const struct fom_result *a, const struct fom_result *b)
+{
+    return a->lo == b->lo || (isnan(a->lo) && isnan(b->lo));
+}
+
 static int same_set(const struct fom_result *a, const struct fom_result *b)
 {
-    return strcmp(a->set, b->set) == 0 && (a->lo == b->lo || (isnan(a->lo) && isnan(b->lo)));
+    return strcmp(a->set, b->set) == 0 && same_bin(a, b);
+}
+
+static void curve_free(struct curve *c)
+{
+    for (size_t k = 0; k < c->room && c->label; k++)
+        free(c->label[k]);
+    free(c->r);
+    free(c->label);
+    free(c->theta);
+    free(c->y);
+}
+
+/* An empty curve with room for n groups; curve_free also after failure. */
+static int curve_new(struct curve *c, size_t n)
+{
+    *c = (struct curve){.room = n, .r = calloc(n + 1, sizeof *c->r), .label = calloc(n + 1, sizeof *c->label),
+                        .theta = calloc(n + 1, sizeof *c->theta), .y = calloc(n + 1, sizeof *c->y)};
+    return c->r && c->label && c->theta && c->y ? OK : E_NOMEM;
 }
 
 /* Equal labels for equal (field, part): parts come in groups of 16 in order. */
@@ -91,16 +114,22 @@ static double lowest(size_t n, const double *x, const double *y)
     return v > x[0] && v < x[n - 1] ? exp(v) : NAN;
 }
 
+/* y of every scale with the blocks of draw k; weight and index have room for all of them. */
+static void draw(struct curve *c, const struct fom_options *o, long k, double *weight, uint32_t *index)
+{
+    memset(weight, 0, c->labels * sizeof *weight);
+    stats_resample(c->labels, c->labels, o->seed, (uint64_t)k, index);
+    for (size_t i = 0; i < c->labels; i++)
+        weight[index[i]]++;
+    weigh(c, weight);
+}
+
 static double spread_of_draws(struct curve *c, const struct fom_options *o, double *weight, uint32_t *index, double *v)
 {
     size_t used = 0;
     struct stats s;
     for (long k = 0; k < o->draws; k++) {
-        memset(weight, 0, c->labels * sizeof *weight);
-        stats_resample(c->labels, c->labels, o->seed, (uint64_t)k, index);
-        for (size_t i = 0; i < c->labels; i++)
-            weight[index[i]]++;
-        weigh(c, weight);
+        draw(c, o, k, weight, index);
         v[used] = lowest(c->n, c->theta, c->y);
         used += isfinite(v[used]) ? 1 : 0;
     }
@@ -109,15 +138,18 @@ static double spread_of_draws(struct curve *c, const struct fom_options *o, doub
     return 2 * used > (size_t)o->draws ? sqrt(s.var) : NAN;
 }
 
-/* The scales of r[first]'s set into c; its arrays have room for n. */
-static int collect(struct curve *c, size_t n, const struct fom_result *r, size_t first)
+/* The groups that `same` finds like `first` (one set: by scale) and their labels into c. */
+static int collect(struct curve *c, size_t n, const struct fom_result *r, const struct fom_result *first,
+                   int (*same)(const struct fom_result *, const struct fom_result *))
 {
     c->n = 0;
     for (size_t i = 0; i < n; i++)
-        if (same_set(&r[i], &r[first]) && r[i].blocks > 0)
+        if (same(&r[i], first) && r[i].blocks > 0)
             c->r[c->n++] = &r[i];
-    qsort(c->r, c->n, sizeof *c->r, by_scale);
+    if (same == same_set)
+        qsort(c->r, c->n, sizeof *c->r, by_scale);
     for (size_t i = 0; i < c->n; i++) {
+        free(c->label[i]);
         c->label[i] = malloc(c->r[i]->blocks * sizeof **c->label);
         if (!c->label[i])
             return E_NOMEM;
@@ -129,7 +161,7 @@ static int collect(struct curve *c, size_t n, const struct fom_result *r, size_t
 static int optimum_of_set(size_t n, struct fom_result *r, size_t first, const struct fom_options *o, struct curve *c)
 {
     double at = NAN, err = NAN;
-    int st = collect(c, n, r, first);
+    int st = collect(c, n, r, &r[first], same_set);
     double *weight = malloc((c->labels + 1) * sizeof *weight), *v = malloc(((size_t)o->draws + 1) * sizeof *v);
     uint32_t *index = malloc((c->labels + 1) * sizeof *index);
     if (!weight || !v || !index)
@@ -153,23 +185,65 @@ static int optimum_of_set(size_t n, struct fom_result *r, size_t first, const st
 
 int fom_optimum(size_t n, struct fom_result *r, const struct fom_options *o)
 {
-    struct curve c = {.r = calloc(n + 1, sizeof *c.r), .label = calloc(n + 1, sizeof *c.label),
-                      .theta = calloc(n + 1, sizeof *c.theta), .y = calloc(n + 1, sizeof *c.y)};
-    int st = c.r && c.label && c.theta && c.y ? OK : E_NOMEM;
+    struct curve c;
+    int st = curve_new(&c, n);
     for (size_t i = 0; i < n && st == OK; i++) {
         size_t j = 0;
         while (j < i && !same_set(&r[j], &r[i]))
             j++;
         if (j == i)
             st = optimum_of_set(n, r, i, o, &c);
-        for (size_t k = 0; k < n; k++) {
-            free(c.label[k]);
-            c.label[k] = NULL;
-        }
     }
-    free(c.r);
-    free(c.label);
-    free(c.theta);
-    free(c.y);
+    curve_free(&c);
+    return st;
+}
+
+/* LOGDCBS of the groups of one bin against `to`, one of them. */
+static int contrast_of_bin(size_t n, struct fom_result *r, const struct fom_result *to, const struct fom_options *o, struct curve *c)
+{
+    const size_t draws = (size_t)o->draws;
+    int st = collect(c, n, r, to, same_bin);
+    double *weight = malloc((c->labels + 1) * sizeof *weight), *v = malloc((draws * c->n + 1) * sizeof *v);
+    uint32_t *index = malloc((c->labels + 1) * sizeof *index);
+    size_t ref = 0;
+    struct stats s;
+    if (!weight || !v || !index)
+        st = E_NOMEM;
+    while (ref < c->n && c->r[ref] != to)
+        ref++;
+    for (long k = 0; k < o->draws && st == OK && ref < c->n; k++) {
+        draw(c, o, k, weight, index);
+        for (size_t i = 0; i < c->n; i++)
+            v[i * draws + (size_t)k] = c->y[i] - c->y[ref];
+    }
+    for (size_t i = 0; i < c->n && st == OK && ref < c->n; i++) {
+        double *of = v + i * draws;
+        size_t used = 0;
+        for (size_t k = 0; k < draws; k++)
+            if (isfinite(of[k]))
+                of[used++] = of[k];
+        stats_sum(used, of, &s);
+        /* as with the optimum: many draws without a value are no error */
+        r[c->r[i] - r].v[FOM_LOGDCBS] = 2 * used > draws ? M_LOG10E * sqrt(s.var) : NAN;
+    }
+    free(weight);
+    free(v);
+    free(index);
+    return st;
+}
+
+int fom_contrast(size_t n, struct fom_result *r, const struct fom_options *o)
+{
+    struct curve c;
+    int st = curve_new(&c, n);
+    for (size_t i = 0; i < n && st == OK; i++) {
+        const struct fom_result *to = fom_reference(n, r, &r[i], o);
+        size_t first = 0;
+        while (!same_bin(&r[first], &r[i]))
+            first++;
+        if (first == i && to)
+            st = contrast_of_bin(n, r, to, o, &c);
+    }
+    curve_free(&c);
     return st;
 }

@@ -22,6 +22,8 @@ near "one row" "$(grep -vc '^#' one.cat)" 1 0
 near "images" "$(col one.cat NIMAGES)" 9 0
 near "n_gal" "$(col one.cat N_GAL)" 100 1e-9
 near "detected" "$(col one.cat N_DET)" 200 1e-9
+fom a0 -q -o single.cat; near "one image: error of the count sqrt(800)/4" "$(col single.cat N_DETERR)" 7.0710678 1e-6
+near "sigma_e: its error, sigma/(2 sqrt n) of normal values to the scatter of their kurtosis" "$(paste <(col one.cat SIGMA_EERR) <(col one.cat SIGMA_E) | awk '{ print $1 / $2 * 2 * sqrt(400) }')" 1 0.2
 near "G" "$(col one.cat G)" 1.25 1e-9
 near "slope by pairs" "$(col one.cat BPAIR1)" 0.95 1e-6
 near "slope by pairs, component 2" "$(col one.cat BPAIR2)" 0.95 1e-6
@@ -90,6 +92,9 @@ for x in 0.04 0.05 0.06 0.07 0.08 0.09 0.10; do
 ok "best scale" fom opt0.*" "* -q -o opt.cat
 between "best scale, arcsec" "$(col opt.cat OPTSCALE | head -1)" 0.066 0.076
 between "its error" "$(col opt.cat OPTSCALEERR | head -1)" 0.0001 0.01
+near "reference scale: no error against itself" "$(col opt.cat LOGDCBS | tail -1)" 0 0
+between "error of another against it" "$(col opt.cat LOGDCBS | sed -n 4p)" 0.001 0.2
+fom opt0.*" "* -q -s 2 -o opts.cat; ok "another seed, another error" test "$(col opt.cat LOGDCBS | head -1)" != "$(col opts.cat LOGDCBS | head -1)"
 ok "three scales are too few" fom opt0.04* opt0.07* opt0.10* -q -o opt3.cat
 near "three scales: undefined" "$(col opt3.cat OPTSCALE | sort -u | grep -c nan)" 1 0
 ok "five scales, least at the end of the range" fom opt0.04* opt0.05* opt0.06* opt0.07* -q --draws 0 -o opt4.cat
