@@ -15,7 +15,7 @@
 #include <wcslib/wcsfix.h>
 #include <wcslib/wcshdr.h>
 
-enum { PART = 256 };
+enum { PART = 256, MOST_AXES = 32 };
 
 struct sky {
     int nwcs;
@@ -88,6 +88,13 @@ static int is_number(const char *key)
     return 0;
 }
 
+/* WCSAXES, or that of an alternate map: wcspih takes n^2 numbers of memory for whatever it says, wcsset knows 32. */
+static int bad_axes(const struct header *one, const char *key)
+{
+    long n;
+    return !strncmp(key, "WCSAXES", 7) && header_long(one, key, &n) != E_MISSING && (header_long(one, key, &n) || n < 0 || n > MOST_AXES);
+}
+
 /* What wcslib would leave out without a word, or stumble over. */
 static int check_cards(const struct header *h, struct err *e)
 {
@@ -101,6 +108,8 @@ static int check_cards(const struct header *h, struct err *e)
         snprintf(key, sizeof key, "%.*s", (int)strcspn(h->card[i], " ="), h->card[i]);
         if (is_number(key) && header_double(&one, key, &v) == E_DATA)
             return err_set(e, E_DATA, "WCS: %s is not a number: correct the keyword", key);
+        if (bad_axes(&one, key))
+            return err_set(e, E_DATA, "WCS: %s is not a whole number from 0 to %d: correct the keyword", key, MOST_AXES);
         for (size_t k = 0; k < sizeof text / sizeof *text; k++)
             if (!strncmp(key, text[k], strlen(text[k])) && without_end(h->card[i]))
                 return err_set(e, E_DATA, "WCS: %s is text without a closing quote", key);

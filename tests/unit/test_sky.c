@@ -251,9 +251,28 @@ static void test_text_without_end(void)
     check_that(with_card("OBJECT", "OBJECT  = 'it''s'", &e) == OK, "nor two quotes for one");
 }
 
+/* wcspih takes memory for as many axes as WCSAXES says: 2e9 of them were "out of memory". */
+static void test_number_of_axes(void)
+{
+    static const char *const bad[] = {"WCSAXES =           2000000000", "WCSAXES =                   33", "WCSAXES =                   -1",
+                                      "WCSAXES =                  2.5", "WCSAXES = 'two'", "WCSAXESB=           2000000000"};
+    static const char *const good[] = {"WCSAXES =                    2", "WCSAXESB=                    2"};
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        e.text[0] = 0;
+        check_that(with_card("WCSAXES", bad[i], &e) == E_DATA && strstr(e.text, "WCSAXES") && strstr(e.text, "from 0 to 32"), "%s: %s", bad[i], e.text);
+    }
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        e.text[0] = 0;
+        check_that(with_card("WCSAXES", good[i], &e) == OK, "%s is read: %s", good[i], e.text);
+    }
+    check_that(with_card("WCSAXES", "WCSAXES =                   32", &e) == E_DATA && strstr(e.text, "singular"), "32 axes: what lacks is their matrix: %s", e.text);
+}
+
 int main(void)
 {
     test_text_without_end();
+    test_number_of_axes();
     test_tan();
     test_rotated();
     test_distorted();
