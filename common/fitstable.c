@@ -361,6 +361,8 @@ static int add_columns(struct fits_rows *r)
             snprintf(what, sizeof what, "no description");
         if (table_find(r->t, c->name))
             return bad(r, c, "appears twice");
+        if (strcmp(c->name, "HISTORY") == 0)
+            return bad(r, c, "a line of names that begins so would be one of history: call it otherwise");
         if (!isupper((unsigned char)c->name[0]))
             return bad(r, c, "the name does not begin with a letter");
         st = table_add(r->t, c->name, c->missing ? COL_REAL : c->type, unit, what);

@@ -675,6 +675,8 @@ static int add_columns(struct lines *s, const struct labels *h, struct table *t,
         int last = ragged && i + 1 == h->n;
         if (table_find(t, l->name))
             return err_set(s->e, E_DATA, "%s: the header names column %s twice", s->name, l->name);
+        if (strcmp(l->name, "HISTORY") == 0)
+            return err_set(s->e, E_DATA, "%s: a column HISTORY: such a line of names would be one of history: call it otherwise", s->name);
         int type = last ? COL_RAGGED : l->type == UNTYPED ? COL_REAL : l->type;
         if (table_add(t, l->name, (enum col_type)type, l->unit, l->what))
             return err_set(s->e, E_NOMEM, "%s: %s", s->name, err_text(E_NOMEM));

@@ -54,3 +54,7 @@ rrgshape none.fits cat.none -x 0.1 --fixed-width 2 --stars stars.rrg -o known.tw
 # Source Extractor's catalogues have no PIXSCALE; the image knows it
 rrgshape noisy.fits cat.none --stars stars.fits,scat.none -o known.one; rrgshape noisy.fits cat.txt --stars stars.fits,scat.txt -o known.two
 same "catalogues without PIXSCALE are of their image's pixels" <(col known.one E1) <(col known.two E1)
+
+# a column HISTORY: the text written of it could not be read
+printf '# A B\n1 2\n' >a.txt; cutcat --only-where a.txt -o a.fits; perl -pe "s/'A       '/'HISTORY '/" a.fits >history.fits
+fails "a FITS table with a column HISTORY" 1 cutcat --only-where history.fits

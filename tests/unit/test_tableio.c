@@ -51,6 +51,9 @@ static void test_refused(void)
     refuse("# X FLUX\n1 2\n\n1\n", "in.txt: line 4: 1 cells where the header names 2 columns");
     refuse("# X FLUX\n1 2\n1 2 3\n", "in.txt: line 3: 3 cells where the header names 2 columns");
     refuse("# X X\n1 2\n", "in.txt: the header names column X twice");
+    /* a text of ours would begin "# HISTORY B", and the names were gone on reading it */
+    refuse("#   1 HISTORY  one thing\n#   2 B  another thing\n1 2\n", "in.txt: a column HISTORY: such a line of names would be one of history: call it otherwise");
+    refuse("# B HISTORY\n1 2\n", "in.txt: a column HISTORY: such a line of names would be one of history: call it otherwise");
     refuse("# X Y\n# Column 2: Z [pixel,f64] a column\n1 2\n", "in.txt: the header calls column 2 both Z and Y");
     refuse("# X Y\n# Column 2: Y [pixel,f77] a column\n1 2\n", "in.txt: line 2: type 'f77' is unknown (i64, f64, f32, str16)");
     refuse("# X Y\n# Column 2: Y [pixel,f64 a column\n1 2\n", "in.txt: line 2: a bracket is not closed");
