@@ -166,6 +166,7 @@ struct stretch {
 struct strip {
     size_t nrun, cap_run, npix, cap_pair;
     struct stretch *run;
+    uint32_t *parent;      /* of every run: the first one of its component inside the strip */
     float *pair;           /* of every pixel its filtered and its unfiltered value */
 };
 
@@ -182,11 +183,14 @@ struct scratch {
     struct feeder feeder;
     float *smooth;             /* a row */
     unsigned char *above;      /* a row and zeros up to a multiple of BLOCK */
+    uint32_t *count;           /* of runs */
+    size_t cap_count;
 };
 
 static void strip_free(struct strip *s)
 {
     free(s->run);
+    free(s->parent);
     free(s->pair);
     *s = (struct strip){0};
 }
@@ -273,65 +277,7 @@ static int scan_row(struct strip *s, const struct scanned *row, long nx, const u
     return start >= 0 ? add_run(s, row, start, nx) : OK;
 }
 
-/* One strip with a feeder that is open. */
-static int search_strip(const struct search *s, long i, struct scratch *w)
-{
-    const struct segment_params *p = s->p;
-    long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
-    int st = OK;
-    feeder_seek(&w->feeder, y0);
-    for (long y = y0; y < y1 && !st; y++) {
-        struct scanned row = {.y = y, .smooth = w->smooth};
-        feeder_row(&w->feeder, y, w->smooth, &row.plain);
-        const float *rms = rms_row(&w->feeder, y);
-        row.kind = kind_row(&w->feeder, y);
-        if (p->rms_map)
-            cut_by_map(rms ? rms : p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, w->smooth);
-        mark_above(w->smooth, p->rms_map ? 0 : (float)(p->threshold * p->noise), nx, w->above);
-        if (row.kind)
-            unmark_bad(row.kind, nx, w->above);
-        st = scan_row(&s->strip[i], &row, nx, w->above);
-    }
-    return st;
-}
-
-static int search_strips(void *ctx, long begin, long end, int worker)
-{
-    const struct search *s = ctx;
-    struct scratch *w = &s->scratch[worker];
-    int st = OK;
-    if (!w->above) {
-        w->feeder = (struct feeder){.im = s->im, .b = s->b, .rms_map = s->p->rms_map, .filter = s->filter,
-                                    .negative = s->p->negative};
-        st = feeder_open(&w->feeder, 0);
-        if (st)
-            w->feeder = (struct feeder){0};
-        w->smooth = malloc((size_t)s->im->nx * sizeof(float));
-        w->above = calloc((size_t)s->im->nx + BLOCK, 1);
-        if (!w->smooth || !w->above)
-            st = E_NOMEM;
-    }
-    for (long i = begin; i < end && !st; i++)
-        st = search_strip(s, i, w);
-    return st;
-}
-
-/* Search with scratch for every worker. */
-static int search_all(struct search *s, long n)
-{
-    size_t workers = (size_t)par_team_size(s->p->team);
-    s->scratch = calloc(workers, sizeof *s->scratch);
-    int st = s->scratch ? par_team_for(s->p->team, n, 1, search_strips, s) : E_NOMEM;
-    for (size_t i = 0; i < workers && s->scratch; i++) {
-        feeder_free(&s->scratch[i].feeder);
-        free(s->scratch[i].smooth);
-        free(s->scratch[i].above);
-    }
-    free(s->scratch);
-    return st;
-}
-
-/* ---- components: runs are numbered through all strips; there are fewer than 2^15 of them in a row, 2^31 in all ---- */
+/* ---- components of one strip ---- */
 
 static uint32_t find_root(uint32_t *parent, uint32_t i)
 {
@@ -372,22 +318,155 @@ static void join_rows(struct row up, struct row here, uint32_t *parent)
 }
 
 /* parent[i] = the first run of run i's component. */
-static void join_runs(const struct strip *strip, long n, uint32_t *parent, size_t nrun)
+static void join_strip(const struct strip *s, uint32_t *parent)
 {
     struct row up = {0}, here = {0};
-    for (size_t i = 0; i < nrun; i++)
+    for (size_t i = 0; i < s->nrun; i++)
         parent[i] = (uint32_t)i;
-    for (long k = 0; k < n; k++)
-        for (size_t i = 0; i < strip[k].nrun; i += here.n) {
-            here.run = strip[k].run + i;
-            for (here.n = 1; i + here.n < strip[k].nrun && here.run[here.n].y == here.run->y;)
-                here.n++;
-            if (up.n && up.run->y + 1 == here.run->y)
-                join_rows(up, here, parent);
-            up = here;
-            here.number += (uint32_t)here.n;
+    for (size_t i = 0; i < s->nrun; i += here.n) {
+        here.run = s->run + i;
+        for (here.n = 1; i + here.n < s->nrun && here.run[here.n].y == here.run->y;)
+            here.n++;
+        if (up.n && up.run->y + 1 == here.run->y)
+            join_rows(up, here, parent);
+        up = here;
+        here.number += (uint32_t)here.n;
+    }
+    for (size_t i = 0; i < s->nrun; i++)   /* parents come first and know their roots */
+        parent[i] = parent[parent[i]];
+}
+
+/*
+ * Find the strip's components and drop those of fewer than min_area good pixels that no row before `first` or behind `last`
+ * can go on with: most runs of an image are noise.  What stays keeps its order.
+ */
+static int prune_strip(struct strip *s, long first, long last, long min_area, struct scratch *w)
+{
+    const uint32_t OPEN = 1u << 31;        /* a strip has fewer pixels */
+    int st = grow(&w->count, &w->cap_count, s->nrun + 1, sizeof *w->count);
+    s->parent = st ? NULL : malloc((s->nrun + 1) * sizeof *s->parent);
+    if (!s->parent)
+        return E_NOMEM;
+    uint32_t *parent = s->parent, *count = w->count;
+    join_strip(s, parent);
+    memset(count, 0, s->nrun * sizeof *count);
+    for (size_t i = 0; i < s->nrun; i++) {
+        const struct stretch *r = &s->run[i];
+        count[parent[i]] = (count[parent[i]] + r->good) | (r->y < first || r->y > last ? OPEN : 0);
+    }
+    float *to = s->pair;
+    const float *from = s->pair;
+    size_t n = 0;
+    for (size_t i = 0; i < s->nrun; i++) {
+        const struct stretch r = s->run[i];
+        const size_t many = 2 * (size_t)(r.x1 - r.x0);
+        if (parent[i] == i)                /* from here on: 1 + the place of the first run, 0 dropped */
+            count[i] = count[i] >= (size_t)min_area ? (uint32_t)n + 1 : 0;
+        if (count[parent[i]]) {
+            memmove(to, from, many * sizeof *to);
+            to += many;
+            s->run[n] = r;
+            parent[n++] = count[parent[i]] - 1;
         }
-    for (size_t i = 0; i < nrun; i++)      /* parents come first and know their roots */
+        from += many;
+    }
+    s->nrun = n;
+    s->npix = (size_t)(to - s->pair) / 2;
+    return OK;
+}
+
+/* ---- all strips ---- */
+
+/* One strip with a feeder that is open. */
+static int search_strip(const struct search *s, long i, struct scratch *w)
+{
+    const struct segment_params *p = s->p;
+    long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
+    int st = OK;
+    feeder_seek(&w->feeder, y0);
+    for (long y = y0; y < y1 && !st; y++) {
+        struct scanned row = {.y = y, .smooth = w->smooth};
+        feeder_row(&w->feeder, y, w->smooth, &row.plain);
+        const float *rms = rms_row(&w->feeder, y);
+        row.kind = kind_row(&w->feeder, y);
+        if (p->rms_map)
+            cut_by_map(rms ? rms : p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, w->smooth);
+        mark_above(w->smooth, p->rms_map ? 0 : (float)(p->threshold * p->noise), nx, w->above);
+        if (row.kind)
+            unmark_bad(row.kind, nx, w->above);
+        st = scan_row(&s->strip[i], &row, nx, w->above);
+    }
+    if (!st)
+        st = prune_strip(&s->strip[i], y0 > 0 ? y0 + 1 : 0, y1 < s->im->ny ? y1 - 2 : y1, p->min_area, w);
+    return st;
+}
+
+static int search_strips(void *ctx, long begin, long end, int worker)
+{
+    const struct search *s = ctx;
+    struct scratch *w = &s->scratch[worker];
+    int st = OK;
+    if (!w->above) {
+        w->feeder = (struct feeder){.im = s->im, .b = s->b, .rms_map = s->p->rms_map, .filter = s->filter,
+                                    .negative = s->p->negative};
+        st = feeder_open(&w->feeder, 0);
+        if (st)
+            w->feeder = (struct feeder){0};
+        w->smooth = malloc((size_t)s->im->nx * sizeof(float));
+        w->above = calloc((size_t)s->im->nx + BLOCK, 1);
+        if (!w->smooth || !w->above)
+            st = E_NOMEM;
+    }
+    for (long i = begin; i < end && !st; i++)
+        st = search_strip(s, i, w);
+    return st;
+}
+
+/* Search with scratch for every worker. */
+static int search_all(struct search *s, long n)
+{
+    size_t workers = (size_t)par_team_size(s->p->team);
+    s->scratch = calloc(workers, sizeof *s->scratch);
+    int st = s->scratch ? par_team_for(s->p->team, n, 1, search_strips, s) : E_NOMEM;
+    for (size_t i = 0; i < workers && s->scratch; i++) {
+        feeder_free(&s->scratch[i].feeder);
+        free(s->scratch[i].smooth);
+        free(s->scratch[i].above);
+        free(s->scratch[i].count);
+    }
+    free(s->scratch);
+    return st;
+}
+
+/* ---- components of the image: runs are numbered through all strips; there are fewer than 2^15 of them in a row, 2^31 in all ---- */
+
+/* The runs of a strip's first row, or of its last one; number: that of the strip's first run. */
+static struct row border_row(const struct strip *s, int last, uint32_t number)
+{
+    size_t n = 0;
+    const struct stretch *end = s->run + (last && s->nrun ? s->nrun - 1 : 0);
+    while (n < s->nrun && (last ? end - n : end + n)->y == end->y)
+        n++;
+    return last ? (struct row){s->run + s->nrun - n, n, number + (uint32_t)(s->nrun - n)} : (struct row){s->run, n, number};
+}
+
+/* parent[i] = the first run of run i's component. */
+static void join_strips(struct strip *strip, long n, uint32_t *parent, size_t nrun)
+{
+    struct row up = {0};
+    uint32_t number = 0;
+    for (long k = 0; k < n; k++) {
+        for (size_t i = 0; i < strip[k].nrun; i++)
+            parent[number + i] = number + strip[k].parent[i];
+        free(strip[k].parent);
+        strip[k].parent = NULL;
+        struct row here = border_row(&strip[k], 0, number);
+        if (up.n && here.n && up.run->y + 1 == here.run->y)
+            join_rows(up, here, parent);
+        up = border_row(&strip[k], 1, number);
+        number += (uint32_t)strip[k].nrun;
+    }
+    for (size_t i = 0; i < nrun; i++)
         parent[i] = parent[parent[i]];
 }
 
@@ -435,7 +514,7 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
     uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
     int st = parent && number ? OK : E_NOMEM;
     if (!st) {
-        join_runs(strip, n, parent, nrun);
+        join_strips(strip, n, parent, nrun);
         st = count_components(s, strip, n, parent, number, nrun, min_area, &at);
     }
     if (!st) {
