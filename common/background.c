@@ -427,6 +427,19 @@ static long least(long a, long b, long c)
     return m < c ? m : c;
 }
 
+/* Median of 9 values by exchanges that leave the middle one at 4 (Paeth 1990). */
+static double median_of_nine(double v[9])
+{
+    static const unsigned char swap[19][2] = {{1, 2}, {4, 5}, {7, 8}, {0, 1}, {3, 4}, {6, 7}, {1, 2}, {4, 5}, {7, 8}, {0, 3},
+                                              {5, 8}, {4, 7}, {3, 6}, {1, 4}, {2, 5}, {4, 7}, {4, 2}, {6, 4}, {4, 2}};
+    for (int i = 0; i < 19; i++) {
+        double *a = &v[swap[i][0]], *b = &v[swap[i][1]], low = *a < *b ? *a : *b, high = *a < *b ? *b : *a;
+        *a = low;
+        *b = high;
+    }
+    return v[4];
+}
+
 /*
  * Median over side x side cells from v into out.  At the border the window
  * shrinks on both sides alike, so that a slope stays what it is.
@@ -443,7 +456,7 @@ static int median_filter(const double *v, long mx, long my, long side, double *o
             for (long b = j - rj; b <= j + rj; b++)
                 for (long a = i - ri; a <= i + ri; a++)
                     box[n++] = v[b * mx + a];
-            out[j * mx + i] = background_median(box, n);
+            out[j * mx + i] = n == 9 ? median_of_nine(box) : background_median(box, n);
         }
     free(box);
     return OK;
@@ -523,25 +536,26 @@ static struct place place_of(const struct mesh *m, long y)
     return (struct place){j, t - (double)j, t < 0 ? -1 : t > (double)(m->my - 1) ? 1 : 0};
 }
 
+/* Between two nodes of values v0, v1 and second derivatives a, b. */
+static inline double between(double v0, double v1, double a, double b, struct place p)
+{
+    double c[4], u = p.u;
+    cubic(v0, v1, a, b, c);
+    if (p.outside < 0)
+        return c[0] + u * c[1];
+    if (p.outside > 0)
+        return c[0] + c[1] + c[2] + c[3] + (u - 1) * (c[1] + 2 * c[2] + 3 * c[3]);
+    return c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+}
+
 /* Value and x second derivative of column k at a pixel row, into v[0..1]. */
 static void column_at(const struct mesh *m, long k, struct place p, double v[2])
 {
     size_t n = (size_t)m->mx * (size_t)m->my;
-    long j = p.j;
+    long at = p.j * m->mx;
     for (int part = 0; part < 2; part++) {
         const double *f = m->node + (size_t)part * n + k, *d = f + 2 * n;
-        if (m->my == 1) {
-            v[part] = f[0];
-            continue;
-        }
-        double c[4], u = p.u;
-        cubic(f[j * m->mx], f[(j + 1) * m->mx], d[j * m->mx], d[(j + 1) * m->mx], c);
-        if (p.outside < 0)
-            v[part] = c[0] + u * c[1];
-        else if (p.outside > 0)
-            v[part] = c[0] + c[1] + c[2] + c[3] + (u - 1) * (c[1] + 2 * c[2] + 3 * c[3]);
-        else
-            v[part] = c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+        v[part] = m->my == 1 ? f[0] : between(f[at], f[at + m->mx], d[at], d[at + m->mx], p);
     }
 }
 
@@ -557,23 +571,38 @@ static void column_of_row(const struct mesh *m, long k, long y, double v[2])
     }
 }
 
-/* Fill the table of rows. */
-static int mesh_rows(struct mesh *m)
+/* Every second place of row gets one of mx columns: v and d are the values and second derivatives at the row of nodes below. */
+WIDE static void fill_row(const double *restrict v, const double *restrict d, long mx, struct place p, float *restrict row)
 {
-    float *row = malloc(2 * (size_t)m->ny * (size_t)m->mx * sizeof *row);
-    if (!row)
-        return E_NOMEM;
-    for (long y = 0; y < m->ny; y++) {
+    for (long k = 0; k < mx; k++)
+        row[2 * k] = (float)between(v[k], v[mx + k], d[k], d[mx + k], p);
+}
+
+/* Rows of the table of rows. */
+static int fill_rows(void *ctx, long begin, long end, int worker)
+{
+    const struct mesh *m = ctx;
+    size_t n = (size_t)m->mx * (size_t)m->my;
+    (void)worker;
+    for (long y = begin; y < end; y++) {
         struct place p = place_of(m, y);
-        for (long k = 0; k < m->mx; k++) {
-            double v[2];
-            column_at(m, k, p, v);
-            row[2 * (y * m->mx + k)] = (float)v[0];
-            row[2 * (y * m->mx + k) + 1] = (float)v[1];
+        for (int part = 0; part < 2; part++) {
+            const double *f = m->node + (size_t)part * n;
+            float *row = m->row + 2 * y * m->mx + part;
+            for (long k = 0; k < m->mx && m->my == 1; k++)
+                row[2 * k] = (float)f[k];
+            if (m->my > 1)
+                fill_row(f + p.j * m->mx, f + 2 * n + (size_t)(p.j * m->mx), m->mx, p, row);
         }
     }
-    m->row = row;
     return OK;
+}
+
+/* Fill the table of rows. */
+static int mesh_rows(struct mesh *m, struct par_team *team)
+{
+    m->row = malloc(2 * (size_t)m->ny * (size_t)m->mx * sizeof *m->row);
+    return m->row ? par_team_for(team, m->ny, 64, fill_rows, m) : E_NOMEM;
 }
 
 /* Pixels from .. to-1 of a row: the cubic c at t = start + (place - anchor) * spacing of the mesh. */
@@ -782,7 +811,7 @@ static int finish(struct background *b, struct cells *c)
     if (!st)
         st = mesh_new(&out.rms, c->im, c->mx, c->my, sigma, (double)(float)out.mean_rms);
     if (!st)
-        st = mesh_rows(&out.level);
+        st = mesh_rows(&out.level, c->p->team);
     free(level);
     if (st)
         background_free(&out);

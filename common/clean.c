@@ -1,9 +1,10 @@
 /* clean.c - spurious detections in the wings of bright objects; see clean.h. */
 #include "clean.h"
+#include "grow.h"
 #include <math.h>
 #include <stdlib.h>
 
-enum { CELL = 8 };
+enum { CELL = 8, TASK = 128 };             /* pixels; blobs */
 static const double REACH = 10;            /* rms radii */
 
 struct wing {
@@ -16,12 +17,30 @@ struct grid {
     double *centre;                        /* x, y of every blob */
 };
 
+/* The light of owner's wing at the victim, more than its margin. */
+struct claim {
+    int32_t victim, owner;
+    double light;
+};
+
+struct claims {
+    struct claim *claim;
+    size_t n, cap;
+};
+
+struct cleaning {
+    const struct blob_list *list;
+    double beta;
+    struct grid grid;
+    struct claims *of;                     /* one list a task */
+};
+
 static struct wing wing_of(const struct blob *b, double beta)
 {
     struct wing w;
-    double xx, xy, yy, a, s, theta;
+    double xx, xy, yy, a, s;
     blob_moments(b, &w.x, &w.y, &xx, &xy, &yy);
-    ellipse_axes(xx, xy, yy, &a, &s, &theta);
+    ellipse_axes(xx, xy, yy, &a, &s, NULL);
     double det = xx * yy - xy * xy;
     w.a = a;
     w.cxx = yy / det;
@@ -57,12 +76,13 @@ static int grid_new(struct grid *g, const struct blob_list *list, long nx, long 
     return OK;
 }
 
-/* A brighter object takes its victims: fainter ones whose margin its wing exceeds. */
-static void claim(const struct blob_list *list, size_t i, double beta, const struct grid *g,
-                  int32_t *into, double *claim_of)
+/* A brighter object claims its victims: fainter ones whose margin its wing exceeds. */
+static int claim(const struct cleaning *t, size_t i, struct claims *out)
 {
+    const struct blob_list *list = t->list;
+    const struct grid *g = &t->grid;
     const struct blob *b = &list->blob[i];
-    struct wing w = wing_of(b, beta);
+    struct wing w = wing_of(b, t->beta);
     double reach = REACH * w.a;
     double pad = reach < 1e6 ? reach : 1e6;
     long c0 = w.x > pad ? (long)(w.x - pad) / CELL : 0, c1 = (long)(w.x + pad) / CELL;
@@ -79,30 +99,54 @@ static void claim(const struct blob_list *list, size_t i, double beta, const str
                 if (!(dx * dx + dy * dy < reach * reach))
                     continue;
                 double r2 = w.cxx * dx * dx + w.cyy * dy * dy + w.cxy * dx * dy;
-                double light = w.peak * pow(1 + w.k * r2, -beta);
-                if (light > o->margin && light > claim_of[j]) {
-                    claim_of[j] = light;
-                    into[j] = (int32_t)i;
-                }
+                double light = w.peak * pow(1 + w.k * r2, -t->beta);
+                if (!(light > o->margin))
+                    continue;
+                int st = grow(&out->claim, &out->cap, out->n + 1, sizeof *out->claim);
+                if (st)
+                    return st;
+                out->claim[out->n++] = (struct claim){j, (int32_t)i, light};
+            }
+    return OK;
+}
+
+static int claim_some(void *ctx, long begin, long end, int worker)
+{
+    const struct cleaning *t = ctx;
+    int st = OK;
+    (void)worker;
+    for (long i = begin; i < end && !st; i++)
+        st = claim(t, (size_t)i, &t->of[begin / TASK]);
+    return st;
+}
+
+/* Every victim to the wing that is brightest there, of equal ones to the first; light: n zeros. */
+static void settle_claims(const struct claims *of, long tasks, int32_t *into, double *light)
+{
+    for (long k = 0; k < tasks; k++)
+        for (const struct claim *c = of[k].claim, *end = c + of[k].n; c < end; c++)
+            if (c->light > light[c->victim]) {
+                light[c->victim] = c->light;
+                into[c->victim] = c->owner;
             }
 }
 
-int clean_objects(struct blob_list *list, double beta, long nx, long ny, int32_t *into)
+int clean_objects(struct blob_list *list, double beta, long nx, long ny, struct par_team *team, int32_t *into)
 {
     if (!(beta >= 0.1 && beta <= 10))
         return E_RANGE;
     size_t n = list->n;
-    struct grid g = {0};
+    long tasks = (long)((n + TASK - 1) / TASK);
+    struct cleaning t = {.list = list, .beta = beta, .of = calloc((size_t)tasks + 1, sizeof(struct claims))};
     double *light = calloc(n + 1, sizeof *light);
-    if (!light)
-        return E_NOMEM;
-    int st = grid_new(&g, list, nx, ny);
+    int st = t.of && light ? grid_new(&t.grid, list, nx, ny) : E_NOMEM;
+    if (!st)
+        st = par_team_for(team, (long)n, TASK, claim_some, &t);
     if (st)
         goto done;
     for (size_t i = 0; i < n; i++)
         into[i] = (int32_t)i;
-    for (size_t i = 0; i < n; i++)
-        claim(list, i, beta, &g, into, light);
+    settle_claims(t.of, tasks, into, light);
     for (size_t i = 0; i < n; i++) {       /* follow chains: each step leads to a brighter object */
         int32_t end = into[i];
         while (into[end] != end)
@@ -117,9 +161,12 @@ int clean_objects(struct blob_list *list, double beta, long nx, long ny, int32_t
         if (into[i] != (int32_t)i)
             blob_absorb(&list->blob[into[i]], &list->blob[i]);
 done:
-    free(g.head);
-    free(g.next);
-    free(g.centre);
+    for (long k = 0; k < tasks && t.of; k++)
+        free(t.of[k].claim);
+    free(t.of);
+    free(t.grid.head);
+    free(t.grid.next);
+    free(t.grid.centre);
     free(light);
     return st;
 }

@@ -12,13 +12,15 @@
 
 #include "deblend.h"
 #include "err.h"
+#include "par.h"
 
 /*
  * into[i] = the blob that i joins (a chain end: never one that itself joined),
  * i itself when it stays.  Blobs that stay get the sums of those that joined.
  * beta: slope of the wings, 0.1..10, larger cleans less.  Time is linear in the
- * number of pairs within reach, found through a grid.
+ * number of pairs within reach, found through a grid by the threads of `team`
+ * (NULL: the calling one alone).
  */
-MUST_CHECK int clean_objects(struct blob_list *list, double beta, long nx, long ny, int32_t *into);
+MUST_CHECK int clean_objects(struct blob_list *list, double beta, long nx, long ny, struct par_team *team, int32_t *into);
 
 #endif

@@ -579,6 +579,8 @@ void ellipse_axes(double xx, double xy, double yy, double *a, double *b, double 
     double half = 0.5 * (xx + yy), d = 0.5 * (xx - yy), r = hypot(d, xy);
     *a = sqrt(half + r);
     *b = sqrt(half - r > 0 ? half - r : 0);
+    if (!theta)
+        return;
     *theta = r > 0 ? 0.5 * atan2(xy, d) * 180 / acos(-1) : 0;
     if (!(*theta > -90))
         *theta = 90;

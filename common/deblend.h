@@ -78,7 +78,7 @@ void blob_absorb(struct blob *a, const struct blob *b);
 void blob_moments(const struct blob *b, double *x, double *y, double *xx, double *xy, double *yy);
 
 /* Ellipse of second moments: rms along both axes, pixels, and the angle of the
-   major axis from +x, degrees, (-90, 90]. */
+   major axis from +x, degrees, (-90, 90]; theta NULL: not asked for. */
 void ellipse_axes(double xx, double xy, double yy, double *a, double *b, double *theta);
 
 #endif

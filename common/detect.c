@@ -12,7 +12,7 @@
 #include <string.h>
 
 enum { BRANCH = 3 };            /* least pixels of a deblended branch */
-enum { COMPONENTS = 256, OBJECTS = 64 };      /* per task */
+enum { COMPONENTS = 64, OBJECTS = 32 };      /* per task */
 
 void detect_weights(float *map, size_t n, enum weight_type type)
 {
@@ -138,21 +138,20 @@ struct split {
     int32_t *owner;            /* per detected pixel of components that are split: object inside the task's list */
     int32_t *whole;            /* per component: the object inside the task's list, -1: split */
     struct blob_list *list;    /* one per task */
+    struct deblend_work **work;    /* one per worker, made by itself */
 };
 
 static int split_components(void *ctx, long begin, long end, int worker)
 {
-    (void)worker;
     struct split *t = ctx;
-    struct deblend_work *w;
-    int st = deblend_work_new(&w);
+    struct deblend_work **w = &t->work[worker];
+    int st = *w ? OK : deblend_work_new(w);
     struct blob_list *list = &t->list[begin / COMPONENTS];
     for (long c = begin; c < end && !st; c++) {
         size_t before = list->n;
-        st = deblend_component(t->s, (size_t)c, t->p, w, t->owner, list);
+        st = deblend_component(t->s, (size_t)c, t->p, *w, t->owner, list);
         t->whole[c] = list->n == before + 1 ? (int32_t)before : -1;
     }
-    deblend_work_free(w);
     return st;
 }
 
@@ -204,14 +203,14 @@ static int label_runs(const struct image *im, const struct split *t, const size_
 }
 
 /* Clean, number the objects that stay, pack their blobs, label their pixels. */
-static int settle(const struct image *im, const struct detect_params *p, const struct split *t, const size_t *base,
-                  struct blob_list *all, struct detection *d)
+static int settle(const struct image *im, const struct detect_params *p, struct par_team *team, const struct split *t,
+                  const size_t *base, struct blob_list *all, struct detection *d)
 {
     size_t n = all->n, kept = 0;
     int32_t *number = malloc((n + 1) * sizeof *number), *into = malloc((n + 1) * sizeof *into);
     int st = number && into ? OK : E_NOMEM;
     if (!st && p->clean)
-        st = clean_objects(all, p->clean_beta, im->nx, im->ny, into);
+        st = clean_objects(all, p->clean_beta, im->nx, im->ny, team, into);
     for (size_t i = 0; i < n && !st; i++)
         if (!p->clean || into[i] == (int32_t)i)
             number[i] = (int32_t)++kept;
@@ -244,18 +243,22 @@ static int separate(const struct image *im, const float *map, const struct detec
         .most = image_count(im) / 8 > DETECT_MOST ? image_count(im) / 8 : DETECT_MOST
     };
     struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)), malloc((s->ncomponent + 1) * sizeof(int32_t)),
-                          calloc((size_t)tasks + 1, sizeof(struct blob_list))};
+                          calloc((size_t)tasks + 1, sizeof(struct blob_list)),
+                          calloc((size_t)par_team_size(team), sizeof(struct deblend_work *))};
     size_t *base = malloc(((size_t)tasks + 1) * sizeof *base);
-    int st = split.owner && split.whole && split.list && base ? OK : E_NOMEM;
+    int st = split.owner && split.whole && split.list && split.work && base ? OK : E_NOMEM;
     if (!st)
         st = par_team_for(team, (long)s->ncomponent, COMPONENTS, split_components, &split);
+    for (int i = 0; i < par_team_size(team) && split.work; i++)
+        deblend_work_free(split.work[i]);
+    free(split.work);
     if (!st)
         st = join_lists(all, split.list, tasks, base);
     for (long i = 0; i < tasks && split.list; i++)
         free(split.list[i].blob);
     free(split.list);
     if (!st)
-        st = settle(im, p, &split, base, all, d);
+        st = settle(im, p, team, &split, base, all, d);
     free(split.owner);
     free(split.whole);
     free(base);
@@ -270,6 +273,7 @@ struct measuring {
     struct detection *d;
     struct progress *progress;
     long steps;                /* of progress for all objects */
+    struct photometry_work **work;     /* one per worker, made by itself */
 };
 
 static void tick(struct progress *p, long n)
@@ -280,15 +284,13 @@ static void tick(struct progress *p, long n)
 
 static int measure_objects(void *ctx, long begin, long end, int worker)
 {
-    (void)worker;
     struct measuring *t = ctx;
-    struct photometry_work *w;
-    int st = photometry_work_new(&w);
+    struct photometry_work **w = &t->work[worker];
+    int st = *w ? OK : photometry_work_new(w);
     size_t m = 2 * t->f.p->napertures + t->f.p->nfractions;
     for (long i = begin; i < end && !st; i++)
-        st = photometry_measure(&t->f, &t->all->blob[i], (int32_t)i, w, &t->d->object[i],
+        st = photometry_measure(&t->f, &t->all->blob[i], (int32_t)i, *w, &t->d->object[i],
                                 m ? t->d->aperture + (size_t)i * m : NULL);
-    photometry_work_free(w);
     long n = (long)t->all->n;
     tick(t->progress, t->steps * end / n - t->steps * begin / n);
     return st;
@@ -307,7 +309,7 @@ static int measure_all(const struct image *im, const float *map, int relative, c
         return E_NOMEM;
     struct photometry_params here = phot;
     struct field found = {im, &d->background, &d->label, &here, NULL};
-    struct measuring t = {{im, &d->background, &d->label, &phot, NULL}, all, d, p->progress, DETECT_STEPS / 2};
+    struct measuring t = {{im, &d->background, &d->label, &phot, NULL}, all, d, p->progress, DETECT_STEPS / 2, NULL};
     if (p->measure) {
         struct background_params bp = {p->back_cell, p->back_filter, phot.gain, p->sky_removed, team, p->dark_sky};
         int st = background_measure(&d->measured, p->measure, p->measure_map, &bp);
@@ -319,7 +321,12 @@ static int measure_all(const struct image *im, const float *map, int relative, c
         phot.rms_map = p->measure_map;
         t.f = (struct field){p->measure, &d->measured, &d->label, &phot, &found};
     }
-    return par_team_for(team, (long)all->n, OBJECTS, measure_objects, &t);
+    t.work = calloc((size_t)par_team_size(team), sizeof *t.work);
+    int st = t.work ? par_team_for(team, (long)all->n, OBJECTS, measure_objects, &t) : E_NOMEM;
+    for (int i = 0; i < par_team_size(team) && t.work; i++)
+        photometry_work_free(t.work[i]);
+    free(t.work);
+    return st;
 }
 
 /* Background, noise, filter and threshold into d. */
