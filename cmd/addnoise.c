@@ -278,7 +278,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         "addnoise", "draw what a detector reads from an image of expected electrons", "[IMAGE]", 0, 1,
         "  addnoise --depth 27.7 clean.fits -o noisy.fits\n"
-        "  simage stars.txt -p psf.fits -x 0.1 | addnoise --sky 23.3 --read-noise 4 -s 7 | detect -\n"
+        "  simage stars.txt -p psf.fits -x 0.1 | addnoise --sky 23.3 --read-noise 4 -s 7 | detect -\n", OUT_FITS
     };
     const struct opt own[] = {
         {"exptime", 'T', OPT_REAL, &r.exptime, 1e-9, 1e12, "S", "exposure time, s, where EXPTIME is missing", 0, 0},

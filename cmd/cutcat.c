@@ -225,7 +225,7 @@ int main(int argc, char **argv)
         "cutcat", "keep the objects of a shape catalogue that are used, and count what each cut removes",
         "[CATALOGUE]", 0, 1,
         "  cutcat image.shapes --stars stars.rrg -o image.use\n"
-        "  cutcat image.shapes --size-floor 0 --where 'MAG_AUTO<26' --mark -o image.marked"};
+        "  cutcat image.shapes --size-floor 0 --where 'MAG_AUTO<26' --mark -o image.marked", OUT_TABLE};
     const struct opt own[] = {
         {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file with DSTAR (default: keywords of the catalogue)", NULL, 1},
         {"dstar", 0, OPT_CHOICE, &p.which, 0, 0, "HOW", "size of a star: smallest width, its own width, each object's width", "min|own|each", 0},

@@ -485,7 +485,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         "detect", "find and measure the objects of an image", "[IMAGE]", 0, 1,
         "  detect field.fits -o field.cat\n"
-        "  detect --kernel 0.12 --threshold 1.5 --threshold-noise pixel --region field.reg field.fits -o field.cat\n"
+        "  detect --kernel 0.12 --threshold 1.5 --threshold-noise pixel --region field.reg field.fits -o field.cat\n", OUT_LDAC
     };
     const struct opt own[] = {
         {.name = "kernel", .letter = 'k', .type = OPT_REAL, .value = &o.kernel, .lo = 0, .hi = 1e5, .arg = "ARCSEC",
@@ -540,8 +540,8 @@ int main(int argc, char **argv)
         {.name = "columns", .letter = 'c', .type = OPT_STR, .value = &o.columns, .arg = "LIST",
          .help = "NAME,NAME,... instead of the default columns; +NAME,... beside them"},
         {.name = "check-image", .type = OPT_STRS, .value = &o.checks, .arg = "TYPE=FILE",
-         .help = "background, rms, filtered, segmentation, objects, subtracted or apertures", .in_file = 1},
-        {.name = "region", .type = OPT_STR, .value = &o.region, .arg = "FILE", .in_file = 1,
+         .help = "background, rms, filtered, segmentation, objects, subtracted or apertures", .in_file = OPT_OUT(OUT_FITS)},
+        {.name = "region", .type = OPT_STR, .value = &o.region, .arg = "FILE", .in_file = OPT_OUT(OUT_REGION),
          .help = "ellipses for DS9"},
         {.name = "negative", .type = OPT_FLAG, .value = &o.p.negative,
          .help = "detect on the negated image and print only the count"},
@@ -557,6 +557,10 @@ int main(int argc, char **argv)
         die(EXIT_USAGE, "--columns: there is no column '%s': see detect(1)", unknown);
     if (o.measure_weight && !o.measure)
         die(EXIT_USAGE, "--measure-weight %s: is the weight of another image: give --measure", o.measure_weight);
+    if (o.p.negative && o.region)
+        die(EXIT_USAGE, "--negative and --region: only a count is written");
+    if (o.p.negative)
+        opt_output(c.out, OUT_LINES);
     check_outputs(&o, c.out);
     if (o.weight)
         inputs[n_inputs++] = o.weight;

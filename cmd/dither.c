@@ -324,7 +324,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         "dither", "make N x N ideally interlaced exposures from an image of N times smaller pixels", "[IMAGE]", 0, 1,
         "  simage stars.txt --subpixel 2 -x 0.2 --size 401,401 | dither -n 2 -o four.fits\n"
-        "  dither -n 2 fine.fits | addnoise --depth 27.7 | drizzle -x 0.1 --pixfrac 0.5 -o deep.fits\n"
+        "  dither -n 2 fine.fits | addnoise --depth 27.7 | drizzle -x 0.1 --pixfrac 0.5 -o deep.fits\n", OUT_FITS
     };
     const struct opt own[] = {
         {"number", 'n', OPT_LONG, &n, 1, DITHER_MAX, "N", "small pixels per pixel and axis: N*N exposures", 0, 0},

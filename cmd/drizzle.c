@@ -131,7 +131,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         "drizzle", "combine exposures on one grid by variable-pixel linear reconstruction", "[EXPOSURES...]", 0, -1,
         "  drizzle four.fits -x 0.1 --pixfrac 0.5 -o deep.fits\n"
-        "  drizzle a.fits b.fits --weight a.fits[WHT] --weight b.fits[WHT] --like grid.fits --flat -o deep.fits\n"
+        "  drizzle a.fits b.fits --weight a.fits[WHT] --weight b.fits[WHT] --like grid.fits --flat -o deep.fits\n", OUT_FITS
     };
     const struct opt own[] = {
         {"pixscale", 'x', OPT_REAL, &q->scale, 1e-9, 1e6, "ARCSEC", "output pixel, arcsec; default the first exposure's", 0, 0},

@@ -161,7 +161,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         "fits2png", "make a picture of an image", "[IMAGE]", 0, 1,
         "  fits2png image.fits -o image.png\n"
-        "  fits2png --zoom 4 --crop 11,21,100,80 image.fits -o part.png\n"
+        "  fits2png --zoom 4 --crop 11,21,100,80 image.fits -o part.png\n", OUT_ANY
     };
     const struct opt own[] = {
         {"low", 'l', OPT_REAL, &v.levels.low, -1e38, 1e38, "VALUE", "value shown black, in the image's unit (median - 2 sigma)", NULL, 0},

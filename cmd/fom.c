@@ -205,7 +205,7 @@ int main(int argc, char **argv)
         "fom", "figures of merit: number density, bias of the shear, its spread, error of the power spectrum",
         "[CATALOGUE...]", 0, -1,
         "  fom sim1-*.use --reference-set sim1 --reference-scale 0.10 -o fom.cat\n"
-        "  fom --table sim1-0.10-*.use"};
+        "  fom --table sim1-0.10-*.use", OUT_TABLE};
     const struct opt own[] = {
         {"reference-scale", 0, OPT_REAL, &o.ref_scale, 1e-6, 1e4, "ARCSEC", "power spectrum errors are divided by that of this scale", NULL, 0},
         {"reference-set", 0, OPT_STR, &o.ref_set, 0, 0, "NAME", "and of this set (default: the first that has the scale)", NULL, 0},
@@ -224,6 +224,8 @@ int main(int argc, char **argv)
     size_t n = (size_t)c.argc;
     if (o.everywhere && !bin_text)
         die(EXIT_USAGE, "--bins-everywhere needs --bins");
+    if (text)
+        opt_output(c.out, OUT_LINES);
     if (bin_text)
         parse_bins(&bins, bin_text);
     o.psf = against == 1;

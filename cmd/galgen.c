@@ -413,13 +413,13 @@ int main(int argc, char **argv)
     struct params p = {.n = -1, .field = 163.84, .mag = {20, 30.8}, .star_mag = 21, .nmax = -1, .recipe = POPULATION_DEFAULTS};
     const struct program prog = {
         "galgen", "draw a field of galaxies or stars: scene list to --output, coefficients to --models", "", 0, 0,
-        "  galgen --models models.txt -s 3 > scene.txt\n  galgen --stars > stars.txt\n"
+        "  galgen --models models.txt -s 3 > scene.txt\n  galgen --stars > stars.txt\n", OUT_TABLE
     };
     const struct opt own[] = {
         {"number", 'n', OPT_LONG, &p.n, 0, 1e7, "N", "objects (default: from the counts; 400 stars)", NULL, 0},
         {"field", 0, OPT_REAL, &p.field, 1e-3, 1e6, "ARCSEC", "side of the field, arcsec", NULL, 0},
         {"mag-range", 0, OPT_PAIR, p.mag, POPULATION_MAG_MIN, POPULATION_MAG_MAX, "LO,HI", "AB magnitudes", NULL, 0},
-        {"models", 0, OPT_STR, &p.models, 0, 0, "FILE", "shapelet catalogue to write", NULL, 1},
+        {"models", 0, OPT_STR, &p.models, 0, 0, "FILE", "shapelet catalogue to write", NULL, OPT_OUT(OUT_TABLE)},
         {"library", 0, OPT_STR, &p.library, 0, 0, "FILE", "draw from this shapelet catalogue", NULL, 1},
         {"library-mags", 0, OPT_CHOICE, &p.library_mags, 0, 0, NULL, "magnitudes of library galaxies", "counts|own", 0},
         {"stars", 0, OPT_FLAG, &p.stars, 0, 0, NULL, "stars instead of galaxies", NULL, 0},

@@ -256,7 +256,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         .name = "psfgen", .what = "make a PSF file from a telescope's pupil: image and transfer function",
         .operands = "-o FILE", .min_operands = 0, .max_operands = 0,
-        .examples = "  psfgen -o psf.fits\n  psfgen --telescope euclid --zernike 4:0.05,8:0.03 --pixel 0.1 --scale 0.02 -o euclid.fits\n",
+        .examples = "  psfgen -o psf.fits\n  psfgen --telescope euclid --zernike 4:0.05,8:0.03 --pixel 0.1 --scale 0.02 -o euclid.fits\n", .writes = OUT_FITS,
     };
     const struct opt own[] = {
         {"telescope", 0, OPT_CHOICE, &g.telescope, 0, 0, NULL, "preset; what follows changes it", "snap|hst|euclid|roman", 0},

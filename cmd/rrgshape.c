@@ -461,7 +461,7 @@ int main(int argc, char **argv)
         "rrgshape", "measure shapes: Gaussian-weighted moments corrected for the PSF, response to shear",
         "IMAGE CATALOGUE", 2, 2,
         "  rrgshape --stars-only stars.fits stars.cat -o stars.rrg\n"
-        "  rrgshape image.fits image.cat --stars stars.rrg -o image.shapes"};
+        "  rrgshape image.fits image.cat --stars stars.rrg -o image.shapes", OUT_TABLE};
     const struct opt own[] = {
         {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file, or STARS_IMAGE,STARS_CATALOGUE", NULL, 1},
         {"psf", 'p', OPT_STR, &p.psf, 0, 0, "FILE", "PSF file instead of stars; none: no correction", NULL, 1},
@@ -473,13 +473,13 @@ int main(int argc, char **argv)
         {"weight-cut", 0, OPT_REAL, &p.cut, 0.5, 100, "K", "radius where the weight ends, in widths", NULL, 0},
         {"fourth", 0, OPT_CHOICE, &p.fourth, 0, 0, "HOW", "PSF correction of the fourth moments", "exact|plain", 0},
         {"psf-correction", 0, OPT_CHOICE, &p.correction, 0, 0, "HOW", "PSF freed of its weight; first: width 0.18 arcsec", "resummed|first", 0},
-        {"plain", 0, OPT_STR, &p.plain, 0, 0, "FILE", "second catalogue, as --fourth plain --psf-correction first give it", NULL, 1},
+        {"plain", 0, OPT_STR, &p.plain, 0, 0, "FILE", "second catalogue, as --fourth plain --psf-correction first give it", NULL, OPT_OUT(OUT_TABLE)},
         {"centroid-term", 0, OPT_FLAG, &p.centroid, 0, 0, NULL, "add the motion of the centroid to P11, P22", NULL, 0},
         {"no-recenter", 0, OPT_FLAG, &p.no_recenter, 0, 0, NULL, "measure about X_IMAGE, Y_IMAGE", NULL, 0},
         {"no-background", 0, OPT_FLAG, &p.no_background, 0, 0, NULL, "do not subtract the column BACKGROUND", NULL, 0},
         {"weight", 0, OPT_STR, &p.weight, 0, 0, "FILE", "weight map: 1/variance when WHTTYPE is IVM, else relative", NULL, 1},
         {"segmentation", 0, OPT_STR, &p.segmentation, 0, 0, "FILE", "labels of pixels: neighbours are masked", NULL, 1},
-        {"region", 0, OPT_STR, &p.region, 0, 0, "FILE", "ellipses of the objects for DS9", NULL, 1},
+        {"region", 0, OPT_STR, &p.region, 0, 0, "FILE", "ellipses of the objects for DS9", NULL, OPT_OUT(OUT_REGION)},
         {"star-average", 0, OPT_CHOICE, &p.average, 0, 0, "HOW", "average over stars", "mean|median", 0},
         {"max-stars", 0, OPT_LONG, &p.max_stars, 0, 1e9, "N", "use N of the good stars, spread over the catalogue (0: all)", NULL, 0},
         {"pixscale", 'x', OPT_REAL, &p.scale, 0, 1e4, "ARCSEC", "pixel scale over the header's, arcsec (0: header)", NULL, 0},

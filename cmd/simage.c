@@ -492,7 +492,7 @@ int main(int argc, char **argv)
     const struct program prog = {
         "simage", "draw the expected electrons of a scene: shear, PSF, charge diffusion, pixels", "[SCENE]", 0, 1,
         "  simage scene.txt --models models.txt -p psf.fits -x 0.1 --shear 0.05,0 -o image.fits\n"
-        "  simage stars.txt -p psf.fits -x 0.1 --size 800,800 | addnoise --depth 27.7 | detect -\n"
+        "  simage stars.txt -p psf.fits -x 0.1 --size 800,800 | addnoise --depth 27.7 | detect -\n", OUT_FITS
     };
     const struct opt own[] = {
         {"models", 'm', OPT_STR, &r.models, 0, 0, "FILE", "shapelet catalogue of the objects", 0, 1},
@@ -516,7 +516,7 @@ int main(int argc, char **argv)
         {"wcs", 0, OPT_STR, &r.wcs, 0, 0, "FILE", "see the sky through this image's WCS, distortion included", 0, 1},
         {"center", 0, OPT_PAIR, r.centre, -360, 360, "RA,DEC", "sky position of the field centre, deg", 0, 0},
         {"set", 0, OPT_STR, &r.set, 0, 0, "NAME", "name of the set, keyword SETNAME", 0, 0},
-        {"truth", 0, OPT_STR, &r.truth, 0, 0, "FILE", "write the list with position and flux in the image", 0, 1},
+        {"truth", 0, OPT_STR, &r.truth, 0, 0, "FILE", "write the list with position and flux in the image", 0, OPT_OUT(OUT_TABLE)},
         {"psf-scale", 0, OPT_REAL, &r.psf_options.scale, 1e-9, 1e6, "ARCSEC", "sampling of the PSF, over its header", 0, 0},
         {"psf-cutoff", 0, OPT_REAL, &r.psf_options.cutoff, 1e-9, 1e9, "U", "its highest frequency, cycles/arcsec", 0, 0},
         {"psf-has-pixel", 0, OPT_FLAG, &r.psf_options.has_pixel, 0, 0, 0, "the PSF contains the pixel", 0, 0},

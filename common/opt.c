@@ -466,6 +466,29 @@ static double physical_memory(void)
     return pages > 0 && size > 0 ? (double)pages * (double)size : 4e9;
 }
 
+void opt_output(const char *name, enum out_format format)
+{
+    const char *promise = outname_promises(name, format);
+    static const char *const what[] = {[OUT_FITS] = "FITS", [OUT_TABLE] = "a catalogue (text, or FITS under .fits)",
+                                       [OUT_LDAC] = "a catalogue (text, or FITS under .fits and .ldac)", [OUT_LINES] = "text", [OUT_REGION] = "a region file"};
+    if (promise)
+        die(EXIT_USAGE, "%s: the name promises %s, but %s is written: give another name", name, promise, what[format]);
+}
+
+/* Names of outputs promise no other format than they get. */
+static void check_names(const struct program *prog, const struct opt *own, const struct common *c)
+{
+    opt_output(c->out, prog->writes);
+    for (const struct opt *o = own; o->name; o++) {
+        const struct opt_strs *s = o->value;
+        const enum out_format format = o->in_file > 1 ? (enum out_format)(o->in_file - 1) : OUT_ANY;
+        if (o->type == OPT_STR && format && *(const char *const *)o->value)
+            opt_output(*(const char *const *)o->value, format);
+        for (size_t i = 0; o->type == OPT_STRS && format && i < s->n; i++)
+            opt_output(s->v[i], format);
+    }
+}
+
 void opt_parse(const struct program *prog, const struct opt *own, struct common *c, int argc, char **argv)
 {
     struct parser p = {prog, own, c, argc, argv};
@@ -501,6 +524,7 @@ void opt_parse(const struct program *prog, const struct opt *own, struct common 
         die(EXIT_USAGE, "standard input can be read once only");
     if (inputs == 1 && isatty(STDIN_FILENO))
         die(EXIT_USAGE, "standard input is a terminal: usage: %s [OPTION]... %s", prog->name, prog->operands);
+    check_names(prog, own, c);
 }
 
 int opt_given(const struct opt *own, const struct common *c, const char *name)

@@ -5,6 +5,7 @@
 #ifndef PIXSHEAR_OPT_H
 #define PIXSHEAR_OPT_H
 
+#include "outname.h"
 #include <stddef.h>
 #include <stdint.h>
 
@@ -29,6 +30,8 @@ struct opt_strs {
     const char **v;
 };
 
+#define OPT_OUT(format) (1 + (int)(format))
+
 struct opt {
     const char *name;      /* long name without dashes */
     int letter;            /* short name or 0 */
@@ -38,7 +41,7 @@ struct opt {
     const char *arg;       /* name of the value in --help, with its unit */
     const char *help;      /* one line; unit in it */
     const char *choices;   /* OPT_CHOICE: "a|b|c" */
-    int in_file;           /* value is a file name: HISTORY keeps the base name */
+    int in_file;           /* value is a file name (HISTORY keeps the base name): 1 of an input, OPT_OUT(format) of an output */
 };
 
 struct program {
@@ -47,6 +50,7 @@ struct program {
     const char *operands;  /* "[IMAGE]" */
     int min_operands, max_operands;   /* max < 0: any number */
     const char *examples;  /* two lines for --help */
+    enum out_format writes;           /* to --output */
 };
 
 /* What every program understands with the same meaning. */
@@ -73,6 +77,9 @@ struct common {
  */
 void opt_parse(const struct program *prog, const struct opt *own, struct common *c,
                int argc, char **argv);
+
+/* Exit 2 when the name of an output promises another format; opt_parse does it for all that the tables tell. */
+void opt_output(const char *name, enum out_format format);
 
 /* 1 if the program's own option `name` was typed on the command line. */
 int opt_given(const struct opt *own, const struct common *c, const char *name);

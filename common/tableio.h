@@ -26,7 +26,7 @@
 MUST_CHECK int table_read(struct table *t, const char *name, double max_memory, struct err *e);
 
 /*
- * Write; "-" is standard output; a name ending in .fits gives a binary table.
+ * Write; "-" is standard output; a name ending in .fits, .fit or .fts gives a binary table.
  * `record` is appended to HISTORY (NULL: none).  Real cells that are not
  * finite are printed nan, empty words -.
  */

@@ -1,6 +1,7 @@
 /* tablewrite.c - catalogues as text or FITS, written; see tableio.h. */
 #include "imageio.h"
 #include "outfile.h"
+#include "outname.h"
 #include "tableio.h"
 #include <errno.h>
 #include <stdio.h>
@@ -255,8 +256,7 @@ static int write_fits(const struct table *t, struct table_rows *rows, const char
 int table_write_rows(const struct table *t, struct table_rows *rows, const char *name, const char *record,
                      const char *const *inputs, size_t n_inputs, struct err *e)
 {
-    size_t n = strlen(name);
-    if (n > 5 && strcmp(name + n - 5, ".fits") == 0)
+    if (outname_is_fits(name))
         return write_fits(t, rows, name, record, inputs, n_inputs, e);
     return write_text(t, rows, name, record, inputs, n_inputs, e);
 }

@@ -9,16 +9,20 @@ drizzle dith.fits -o drz.fits
 sum() { cat ./*.fits ./*.txt ./*.rrg list | cksum; }
 before=$(sum)
 
-# guarded WHAT FILE... -- COMMAND: with OUT in it standing for each of the files in turn
+# guarded WHAT FILE... -- COMMAND: with OUT in it standing for each of the files in turn, and for another name of the same file,
+# whose suffix promises nothing
 guarded() {
     local what=$1 files=() f wrong=; shift
     while [ "$1" != -- ]; do files+=("$1"); shift; done
     shift
     for f in "${files[@]}"; do
-        local st=0
-        timeout 60 "${@/OUT/$f}" >o 2>e </dev/null || st=$?
-        [ $st -eq 1 ] && grep -q "$f: is also an input" e && [ ! -e made ] && [ "$(sum)" = "$before" ] || wrong="$wrong $f: exit $st: $(head -c 200 e);"
-        rm -f made
+        ln -f $f $f.in
+        for f in $f $f.in; do
+            local st=0
+            timeout 60 "${@/OUT/$f}" >o 2>e </dev/null || st=$?
+            if [ $st -eq 2 ]; then grep -q "$f: the name promises" e; else [ $st -eq 1 ] && grep -q "$f: is also an input" e; fi && [ ! -e made ] && [ "$(sum)" = "$before" ] || wrong="$wrong $f: exit $st: $(head -c 200 e);"
+            rm -f made
+        done
     done
     if [ -z "$wrong" ]; then pass "$what: none of ${files[*]} is replaced"; else fail "$what:$wrong"; fi
 }
@@ -58,3 +62,48 @@ none "simage, no image" simage scene.txt --models models.txt -x 0.1 --truth made
 none "simage, no truth" simage scene.txt --models models.txt -x 0.1 --truth nowhere/truth -o made
 none "galgen, no list" galgen -n 3 --models made -o nowhere/scene
 none "galgen, no models" galgen -n 3 --models nowhere/models -o made
+
+# A name that promises another format than it would get is a mistake of the command line.
+mkdir names; cd names || exit 1
+for f in noisy.fits cat.txt stars.rrg scene.txt models.txt psf.fits half.fits true.fits dith.fits shapes.txt cut.txt stars.fits scat.txt; do ln -s ../$f .; done
+ls >../kept
+promise() { # WHAT NAME PROMISE COMMAND...: the name in place of OUT
+    local what=$1 name=$2 of=$3; shift 3
+    fails "$what: $name" 2 "${@/OUT/$name}"
+    if grep -q "$name: the name promises $of, but" cmd.err && [ "$(ls -A | grep -vE '^cmd\.(out|err)$')" = "$(cat ../kept)" ]; then pass "$what: $of"; else fail "$what: $(cat cmd.err) $(ls | tr '\n' ' ')"; fi
+}
+while read -r p c; do
+    for n in "x.png a PNG picture" "X.PNG a PNG picture" "x.fits.gz a compressed file" "x.txt text" "x.cat a catalogue" "x.fz a tile-compressed image"; do promise $p "${n%% *}" "${n#* }" $p $c -o OUT; done
+done <<END
+psfgen --pupil-grid 64 --size 32
+simage scene.txt --models models.txt -x 0.1
+dither -n 2 half.fits
+addnoise --depth 27.7 true.fits
+drizzle dith.fits
+END
+while read -r p c; do
+    for n in "x.png a PNG picture" "x.csv comma-separated values" "x.cat.gz a compressed file" "x.vot VOTable" "x.reg regions of DS9"; do promise $p "${n%% *}" "${n#* }" $p $c -o OUT; done
+    [ $p = detect ] || promise $p x.ldac FITS_LDAC $p $c -o OUT
+done <<END
+galgen --stars
+detect noisy.fits
+rrgshape noisy.fits cat.txt --psf none
+cutcat shapes.txt --stars stars.rrg
+fom cut.txt
+END
+promise "galgen --models" x.png "a PNG picture" galgen -n 3 --models OUT -o made
+promise "simage --truth" x.png "a PNG picture" simage scene.txt --models models.txt -x 0.1 --truth OUT -o made
+promise "rrgshape --plain" x.png "a PNG picture" rrgshape noisy.fits cat.txt --psf none --plain OUT -o made
+promise "rrgshape --region" x.fits FITS rrgshape noisy.fits cat.txt --psf none --region OUT -o made
+promise "detect --region" x.cat "a catalogue" detect noisy.fits --region OUT -o made
+promise "detect --check-image" rms=x.png "a PNG picture" detect noisy.fits --check-image OUT -o made
+promise "detect --check-image, the second" rms=x.jpg "a JPEG picture" detect noisy.fits --check-image background=b.fits --check-image OUT -o made
+promise "detect --negative, a count" x.fits FITS detect noisy.fits --negative -o OUT
+promise "fom --table" x.fits FITS fom --table cut.txt -o OUT
+fails "detect --negative writes no regions" 2 detect noisy.fits --negative --region x.reg
+for n in x.fit x.fts x.FITS; do
+    ok "a catalogue called $n" cutcat --only-where cat.txt -o $n
+    near "is FITS" "$(head -c 9 $n | grep -c '^SIMPLE  =')" 1 0
+done
+for n in image image.0.10 .png dir.png/image sci.img; do mkdir -p dir.png; ok "an image called $n" addnoise --depth 27.7 true.fits -o $n; done
+for n in shapes.rrg use.use 0.10 list.txt a.cat .csv; do ok "a catalogue called $n" cutcat --only-where cat.txt -o $n; same "is text" <(head -c 2 $n) <(printf '# '); done

@@ -1,4 +1,4 @@
-# Every program (its output called .png, which only fits2png asks for) in bad surroundings: few descriptors, a small stack, no home, junk
+# Every program in bad surroundings: few descriptors, a small stack, no home, junk
 # locale and time zone, a removed working folder, closed descriptors, two runs on
 # one output; and bad files in all of them: one line, under 64 MiB and 1 s.
 memory=yes patience=20
@@ -21,13 +21,14 @@ fom $in/cut.txt
 fits2png $in/noisy.fits
 END
 }
+target() { if [ "$1" = fits2png ]; then echo fits2png.png; else echo "$1.out"; fi; }    # the output of a program
 mkdir ref box
-while read -r c; do $c -o ref/${c%% *}.png 2>/dev/null; done < <(commands)
+while read -r c; do $c -o ref/$(target ${c%% *}) 2>/dev/null; done < <(commands)
 
 around() { # WHAT COMMAND...: every program, started by COMMAND, gives its bytes
     local what=$1 c name wrong=; shift
     while read -r c; do
-        name=${c%% *}.png; rm -f box/*
+        name=$(target ${c%% *}); rm -f box/*
         "$@" $c -o "$in/box/$name" >o 2>e </dev/null || wrong="$wrong $name: exit $?: $(head -c 150 e);"
         cmp -s ref/$name box/$name || wrong="$wrong $name: other bytes;"
         [ "$(ls -A box)" = $name ] || wrong="$wrong $name: left $(ls -A box);"
@@ -47,7 +48,7 @@ around "a folder that cannot be written" bash -c 'cd / && exec "$@"' -
 
 wrong=
 while read -r c; do
-    name=${c%% *}.png; rm -f box/*
+    name=$(target ${c%% *}); rm -f box/*
     $c -o box/$name 2>/dev/null & $c -o box/$name 2>/dev/null & wait
     cmp -s ref/$name box/$name && [ "$(ls -A box)" = $name ] || wrong="$wrong $name"
 done < <(commands)
@@ -73,9 +74,10 @@ mkdir bad/folder
 runs=0 wrong=
 try() { # COMMAND...
     local st=0 kib ms wall
-    peak cost timeout "$patience" "$@" -o box/out.png >o 2>e </dev/null || st=$?
+    local to; to=box/$(target "$1")
+    peak cost timeout "$patience" "$@" -o $to >o 2>e </dev/null || st=$?
     read -r kib ms wall <cost; runs=$((runs + 1))
-    [ $st -eq 1 ] && [ "$(wc -l <e)" -eq 1 ] && grep -q "^$1: .*bad/" e && [ ! -e box/out.png ] && ! LC_ALL=C grep -q '[^ -~]' e || wrong="$wrong $*: exit $st: $(head -c 200 e);"
+    [ $st -eq 1 ] && [ "$(wc -l <e)" -eq 1 ] && grep -q "^$1: .*bad/" e && [ ! -e $to ] && ! LC_ALL=C grep -q '[^ -~]' e || wrong="$wrong $*: exit $st: $(head -c 200 e);"
     [ -z "$memory" ] || { [ $kib -lt 65536 ] && [ $ms -lt 1000 ]; } || wrong="$wrong $*: $kib KiB, $ms ms;"
     [ $kib -le $most ] || most=$kib
     rm -f box/*
