@@ -466,6 +466,8 @@ static void search(const struct frame *f, const struct program *prog, const stru
                 d.background.mean_level, d.noise, d.threshold, d.filtered_noise, d.found, d.cleaned,
                 difftime(end.tv_sec, begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec));
     char *record = opt_record(prog, own, c);
+    struct err e;
+    outfile_together();
     for (size_t i = 0; i < o->checks.n; i++)
         write_check(o->checks.v[i], f, p, &d, record, inputs, n_inputs);
     if (o->region && !p->negative)
@@ -474,6 +476,8 @@ static void search(const struct frame *f, const struct program *prog, const stru
         write_count(c, &d, inputs, n_inputs);
     else
         write_catalogue(f, o, c, p, &d, record, inputs, n_inputs);
+    if (outfile_appear(&e))
+        die(EXIT_RUN, "%s", e.text);
     free(record);
     detection_free(&d);
 }

@@ -456,9 +456,12 @@ int main(int argc, char **argv)
     else
         make_galaxies(&scene, &models, &p, &c);
     turn_field(&scene, p.turn);
+    outfile_together();
     if (p.models)
         write_table(&models, p.models, record, &p);
     write_table(&scene, c.out, record, &p);
+    if (outfile_appear(&e))
+        die(EXIT_RUN, "%s", e.text);
 
     free(record);
     models_free(&library);

@@ -497,6 +497,8 @@ int main(int argc, char **argv)
         die(EXIT_USAGE, "--plain %s: not with --stars-only, and not another output", p.plain);
     split_stars(&p);
     outputs_ready(&p, &c);
+    outfile_together();
+    struct err e;
     struct input in;
     struct table curve = {0}, plain = {0};
     read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);
@@ -508,6 +510,8 @@ int main(int argc, char **argv)
         write_catalogue(&plain, p.plain, &prog, own, &p, &c);
     if (!c.check)
         write_catalogue(p.stars_only ? &curve : &in.cat, c.out, &prog, own, &p, &c);
+    if (outfile_appear(&e))
+        die(EXIT_RUN, "%s", e.text);
     table_free(&curve);
     table_free(&plain);
     free_input(&in);

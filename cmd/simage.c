@@ -430,6 +430,7 @@ static void run(const struct request *r, const struct common *c, const char *rec
     struct plan plan = {0};
     struct err e;
     check_outputs(r, c);
+    outfile_together();
     read_scene(&in, r, c);
     read_psf(&in, r, c, &v);
     read_wcs(&in, r, c);
@@ -474,7 +475,7 @@ static void run(const struct request *r, const struct common *c, const char *rec
     if (!c->check) {
         const char *inputs[4];
         all_inputs(r, c, inputs);
-        if (image_write(&im, c->out, record, inputs, 4, &e))
+        if (image_write(&im, c->out, record, inputs, 4, &e) || outfile_appear(&e))
             die(EXIT_RUN, "%s", e.text);
     }
     plan_free(&plan);

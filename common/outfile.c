@@ -25,7 +25,7 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { FILE_BUFFER = 256 << 10, SPOOL = 8 << 20, COPY = 256 << 10, EXPECT_LEAST = 1 << 20, TEMPS = 16 };
+enum { FILE_BUFFER = 256 << 10, SPOOL = 8 << 20, COPY = 256 << 10, EXPECT_LEAST = 1 << 20, TEMPS = 64 };
 
 struct outfile {
     char *name;            /* as the user gave it */
@@ -33,6 +33,7 @@ struct outfile {
     char *temp;            /* temporary name, NULL while there is none */
     int stream;            /* copied at commit instead of renamed */
     int replaces;          /* the target exists, with this mode */
+    int ready;             /* on disk under the temporary name: only the rename is left */
     mode_t mode;
     int fd;                /* where flushed bytes are; -1 none yet */
     unsigned char *buf;    /* bytes base .. base + n of the output */
@@ -45,11 +46,14 @@ struct outfile {
 
 /*
  * Names that must go when the program ends or a signal ends it.  A handler has
- * no other way to know them; these are the only variables at file scope in the
- * project.
+ * no other way to know them, nor writers of one of several outputs that there
+ * are others; these are the only variables at file scope in the project.
  */
 static char *volatile doomed[TEMPS];
 static int watching;
+static struct outfile *waiting[TEMPS];     /* ready, for outfile_appear() */
+static size_t n_waiting;
+static int together;
 
 static void remove_doomed(void)
 {
@@ -533,7 +537,8 @@ static void sync_folder(const char *path)
     free(folder);
 }
 
-static int commit_file(struct outfile *o, struct err *e)
+/* Everything on disk, under a temporary name: what may fail for want of room has been done. */
+static int make_ready(struct outfile *o, struct err *e)
 {
     struct stat sb;
     if (o->n && flush(o))
@@ -547,19 +552,36 @@ static int commit_file(struct outfile *o, struct err *e)
         (!o->temp && (watch_signals(), take_name(o, o->fd) < 0)))
         return err_set(e, E_IO, "%s: cannot write: %s", o->name, strerror(errno));
 
-    int bad = close(o->fd) && errno != EINTR;
+    const int bad = close(o->fd) && errno != EINTR;
     o->fd = -1;
+    if (bad)
+        return err_set(e, E_IO, "%s: cannot write: %s", o->name, strerror(errno));
+    free(o->buf);
+    o->buf = NULL;
+    o->ready = 1;
+    return OK;
+}
+
+static int rename_ready(struct outfile *o, struct err *e)
+{
     sigset_t mask;
     signals(SIG_BLOCK, &mask);
-    if (!bad)
-        bad = rename(o->temp, o->path);
-    int why = errno;
+    const int bad = rename(o->temp, o->path), why = errno;
     drop_name(o, !bad);
     signals(SIG_SETMASK, &mask);
-    if (bad)
-        return err_set(e, E_IO, "%s: cannot write: %s", o->name, strerror(why));
-    sync_folder(o->path);
-    return OK;
+    return bad ? err_set(e, E_IO, "%s: cannot write: %s", o->name, strerror(why)) : OK;
+}
+
+static int commit_file(struct outfile *o, struct err *e)
+{
+    int st = make_ready(o, e);
+    if (st || (together && n_waiting < TEMPS))
+        return st;
+    st = rename_ready(o, e);
+    o->ready = 0;
+    if (st == OK)
+        sync_folder(o->path);
+    return st;
 }
 
 int outfile_commit(struct outfile *o, struct err *e)
@@ -571,7 +593,35 @@ int outfile_commit(struct outfile *o, struct err *e)
         st = err_set(e, o->status, "%s: cannot write: %s", o->name, strerror(o->why));
     else
         st = o->stream ? commit_stream(o, e) : commit_file(o, e);
-    destroy(o);
+    if (st == OK && o->ready)
+        waiting[n_waiting++] = o;
+    else
+        destroy(o);
+    return st;
+}
+
+void outfile_together(void)
+{
+    together = 1;
+}
+
+int outfile_appear(struct err *e)
+{
+    int st = OK;
+    size_t n = 0;
+    while (n < n_waiting && st == OK) {
+        st = rename_ready(waiting[n], e);
+        n += st == OK;
+    }
+    for (size_t i = 0; i < n; i++) {
+        if (st && !waiting[i]->replaces)
+            unlink(waiting[i]->path);
+        sync_folder(waiting[i]->path);
+    }
+    for (size_t i = 0; i < n_waiting; i++)
+        destroy(waiting[i]);
+    n_waiting = 0;
+    together = 0;
     return st;
 }
 

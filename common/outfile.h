@@ -60,6 +60,15 @@ uint64_t outfile_size(const struct outfile *o);
 /* Make the file appear; frees o whatever happens. e tells the cause. */
 MUST_CHECK int outfile_commit(struct outfile *o, struct err *e);
 
+/*
+ * For programs with several outputs: from here on outfile_commit() makes files
+ * ready on disk but does not let them appear (streams get their bytes), and
+ * outfile_appear() renames all that wait.  When one cannot be made, or renamed,
+ * none of the new ones is there.
+ */
+void outfile_together(void);
+MUST_CHECK int outfile_appear(struct err *e);
+
 /* Descriptor of a file without a name in $TMPDIR or /tmp, for what does not fit in memory; -1 and errno. */
 int outfile_spool(void);
 

@@ -14,17 +14,20 @@ ls >inputs
 clean_run() { # LABEL: judge the run in $st with output out, reference ref
     if [ $st -eq 0 ]; then
         cmp -s out$ext ref$ext || echo "$1: exit 0 with other bytes"
+        [ ! -e second.ref ] || cmp -s second second.ref || echo "$1: exit 0 with other bytes in the second output"
     elif [ $st -ne 1 ]; then echo "$1: exit $st: $(head -c 200 err)"
     else
         [ "$(wc -l <err)" -eq 1 ] || echo "$1: $(wc -l <err) lines: $(head -c 200 err)"
         [ -e out$ext ] && echo "$1: left an output"
+        [ -e second ] && echo "$1: left the second output"
     fi
-    ls -A | grep -vxF -f inputs | grep -vxE '(out|ref)(\.png|\.fits)?|err|inputs|count|wrong' | sed "s/^/$1: left /"
+    ls -A | grep -vxF -f inputs | grep -vxE '(out|ref)(\.png|\.fits)?|second(\.ref)?|err|inputs|count|wrong' | sed "s/^/$1: left /"
 }
 
-sweep() { # NAME COMMAND...: the command writes to "out"
+sweep() { # NAME COMMAND...: the command writes to "out", and where it has two outputs to "second"
     local name=$1 kind n total step st; shift
     "$@" -o ref$ext 2>err || { fail "$name does not run: $(cat err)"; return; }
+    [ ! -e second ] || mv second second.ref
     : >wrong
     local runs=0
     for kind in malloc write read fsync rename linkat open close; do
@@ -33,7 +36,7 @@ sweep() { # NAME COMMAND...: the command writes to "out"
         total=$(cat count); step=$((total / 12 + 1))
         for ((n = 1; n <= total; n += n < 6 ? 1 : step)); do
             for last in '' 1; do
-                rm -f out$ext
+                rm -f out$ext second
                 st=0
                 FAULT_KIND=$kind FAULT_AT=$n ${last:+env FAULT_LAST=1} env LD_PRELOAD=$so timeout 20 "$@" -o out$ext >/dev/null 2>err || st=$?
                 clean_run "$kind $n of $total${last:+ and later}" >>wrong
@@ -43,7 +46,7 @@ sweep() { # NAME COMMAND...: the command writes to "out"
     done
     if [ -s wrong ]; then fail "$name: $(wc -l <wrong) of $runs: $(head -4 wrong | tr '\n' ';')"
     else pass "$name: $runs faults survived"; fi
-    rm -f out$ext ref$ext
+    rm -f out$ext ref$ext second second.ref
 }
 # asked not to wait for the disk, nothing does; the bytes are the same
 synced() { FAULT_KIND=fsync FAULT_AT=0 FAULT_COUNT=count LD_PRELOAD=$so "$@" addnoise --depth 27.7 true.fits -o "out$#"; cat count; }
@@ -64,7 +67,11 @@ sweep drizzle drizzle dith.fits -x 0.1 --pixfrac 0.5
 sweep "drizzle by lists" drizzle @list.txt --shift shifts.txt --var @list.txt --mask @list.txt -x 0.07
 sweep detect detect noisy.fits
 sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
-sweep "rrgshape with two outputs" rrgshape noisy.fits cat.txt --stars stars.rrg --plain /dev/null
+sweep "rrgshape with two outputs" rrgshape noisy.fits cat.txt --stars stars.rrg --plain second
+sweep "rrgshape with a region file" rrgshape noisy.fits cat.txt --psf none --region second
+sweep "detect with two outputs" detect noisy.fits --check-image segmentation=second
+sweep "galgen with two outputs" galgen --field 12 -n 10 --models second
+sweep "simage with two outputs" simage scene.txt --models models.txt -x 0.1 --size 60,60 --truth second
 sweep cutcat cutcat shapes.txt --stars stars.rrg --snr 3
 sweep fom fom cut.txt
 # rows that wait on disk: more than the 4 MiB that stay in memory

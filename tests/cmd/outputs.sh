@@ -63,6 +63,34 @@ none "simage, no truth" simage scene.txt --models models.txt -x 0.1 --truth nowh
 none "galgen, no list" galgen -n 3 --models made -o nowhere/scene
 none "galgen, no models" galgen -n 3 --models nowhere/models -o made
 
+# where the disk is full for the second output, the first is not there either; earlier files stay
+mkdir disk; trap "umount disk 2>/dev/null" EXIT
+if [ "$(id -u)" = 0 ] && mount -t tmpfs -o size=256k none disk 2>mount.err; then
+    full() { # WHAT NAME NAME COMMAND...: two outputs, 20 KiB left on the disk beside the smaller of them
+        local what=$1 a=$2 b=$3 earlier size free; shift 3
+        ok "$what: with room" "$@"
+        size=$(wc -c <$a); [ "$(wc -c <$b)" -lt "$size" ] && size=$(wc -c <$b)
+        near "$what: the larger does not fit beside the smaller" "$(($(cat $a $b | wc -c) > 2 * size + 20480))" 1 0
+        rm -f disk/*
+        free=$((256 - (size + 4095) / 4096 * 4 - 20)); head -c $((free * 1024)) /dev/zero >disk/filler
+        fails "$what: a full disk" 1 "$@"
+        if [ "$(ls -A disk)" = filler ]; then pass "$what: neither is there"; else fail "$what: $(ls -A disk | tr '\n' ' ')"; fi
+        for earlier in $a $b; do
+            rm -f $a $b; echo old >$earlier
+            fails "$what: a full disk, with an earlier $earlier" 1 "$@"
+            if [ "$(cat $earlier)" = old ] && [ "$(ls -A disk | wc -l)" = 2 ]; then pass "$what: it stays, nothing else is there"; else fail "$what: $(ls -l disk)"; fi
+        done
+        rm -f disk/*
+    }
+    full galgen disk/models disk/scene galgen -n 200 --models disk/models -o disk/scene
+    full detect disk/rms disk/cat detect noisy.fits --check-image rms=disk/rms -o disk/cat
+    full simage disk/truth disk/image simage scene.txt --models models.txt -x 0.1 --truth disk/truth -o disk/image
+    full rrgshape disk/reg disk/shapes rrgshape noisy.fits cat.txt --psf none --region disk/reg -o disk/shapes
+    umount disk; trap - EXIT
+else
+    skip "a full disk: tmpfs cannot be mounted here"
+fi
+
 # A name that promises another format than it would get is a mistake of the command line.
 mkdir names; cd names || exit 1
 for f in noisy.fits cat.txt stars.rrg scene.txt models.txt psf.fits half.fits true.fits dith.fits shapes.txt cut.txt stars.fits scat.txt; do ln -s ../$f .; done

@@ -236,6 +236,27 @@ static void test_same(void)
     check_that(!unlink("same.a") && !unlink("same.b") && !unlink("same.c") && !rmdir("same.d"), "they are removed again");
 }
 
+/* Two outputs appear together, or neither. */
+static void test_together(void)
+{
+    struct err e;
+    if (mkdir("pair", 0777))
+        abort();
+    outfile_together();
+    check_that(make("pair/a", 300000, 5000, &e) == OK && make("pair/b", 99, 10, &e) == OK && access("pair/a", F_OK) && access("pair/b", F_OK)
+               && entries("pair") == 2, "both are ready, under temporary names only");
+    check_that(outfile_appear(&e) == OK && holds("pair/a", 300000) && holds("pair/b", 99) && entries("pair") == 2, "and appear together");
+    check_that(make("pair/c", 99, 10, &e) == OK && holds("pair/c", 99), "afterwards an output appears at its commit");
+    unlink("pair/a");
+
+    outfile_together();
+    check_that(make("pair/a", 99, 10, &e) == OK && make("pair/c", 100, 10, &e) == OK && make("pair/d", 99, 10, &e) == OK && mkdir("pair/d", 0777) == 0,
+               "a folder takes the place of the last");
+    check_that(outfile_appear(&e) == E_IO && strstr(e.text, "pair/d"), "it is told: %s", e.text);
+    check_that(access("pair/a", F_OK) && holds("pair/c", 100) && entries("pair") == 3, "the new first one is gone again, a replaced one stays, no temporary names");
+    check_that(outfile_appear(&e) == OK, "with none waiting nothing happens");
+}
+
 int main(void)
 {
     test_same();
@@ -243,5 +264,6 @@ int main(void)
     test_standard();
     test_targets();
     test_limits();
+    test_together();
     return check_status();
 }
