@@ -73,14 +73,14 @@ static void find_dstar(struct cuts *c, struct starmom *stars, const struct param
     table_free(&t);
 }
 
-static struct cut_where *parse_where(const struct opt_strs *list)
+static struct expr *parse_where(const struct opt_strs *list)
 {
     struct err e;
-    struct cut_where *w = calloc(list->n + 1, sizeof *w);
+    struct expr *w = calloc(list->n + 1, sizeof *w);
     if (!w)
         die(EXIT_RUN, "%s", err_text(E_NOMEM));
     for (size_t i = 0; i < list->n; i++)
-        if (cut_parse(&w[i], list->v[i], &e))
+        if (expr_parse(&w[i], list->v[i], &e))
             die(EXIT_USAGE, "--where %s", e.text);
     return w;
 }
@@ -165,7 +165,7 @@ static void add_counts(struct cut_count *n, const struct cut_count *more)
 }
 
 /* Cut the catalogue block by block into the spool (NULL: only count); t is its header. */
-static void cut_all(struct table_in *in, struct table *t, const struct cuts *c, const struct cut_where *where, const struct params *p,
+static void cut_all(struct table_in *in, struct table *t, const struct cuts *c, const struct expr *where, const struct params *p,
                     const char *name, struct row_spool *spool, struct cut_count *n)
 {
     const size_t rows = table_block_rows(t);
@@ -225,7 +225,7 @@ int main(int argc, char **argv)
         "cutcat", "keep the objects of a shape catalogue that are used, and count what each cut removes",
         "[CATALOGUE]", 0, 1,
         "  cutcat image.shapes --stars stars.rrg -o image.use\n"
-        "  cutcat image.shapes --size-floor 0 --where 'MAG_AUTO<26' --mark -o image.marked", OUT_TABLE};
+        "  cutcat image.shapes --size-floor 0 --where 'MAG_AUTO<26 && MASKED<0.01' --mark -o image.marked", OUT_TABLE};
     const struct opt own[] = {
         {"stars", 0, OPT_STR, &p.stars, 0, 0, "FILE", "star-moment file with DSTAR (default: keywords of the catalogue)", NULL, 1},
         {"dstar", 0, OPT_CHOICE, &p.which, 0, 0, "HOW", "size of a star: smallest width, its own width, each object's width", "min|own|each", 0},
@@ -236,7 +236,7 @@ int main(int argc, char **argv)
         {"size-floor", 0, OPT_REAL, &cuts.floor, 0, 1e6, "PX2", "the floor in the size cut, pixel^2", NULL, 0},
         {"snr", 0, OPT_REAL, &cuts.snr, 0, 1e9, "MIN", "keep FLUX_AUTO/FLUXERR_AUTO >= MIN (0: no cut)", NULL, 0},
         {"flags", 0, OPT_LONG, &cuts.flags, 0, 511, "MASK", "FLAGS_RRG with one of these bits fails the size cut", NULL, 0},
-        {"where", 0, OPT_STRS, &p.where, 0, 0, "EXPR", "keep NAME<VALUE (< <= > >= = !=); may be given several times", NULL, 0},
+        {"where", 0, OPT_STRS, &p.where, 0, 0, "EXPR", "keep where EXPR holds: columns, + - * / ^ &, < <= > >= = !=, && || !; repeatable", NULL, 0},
         {"only-where", 0, OPT_FLAG, &cuts.only_where, 0, 0, NULL, "no other cut: for catalogues of any kind", NULL, 0},
         {"columns", 0, OPT_STR, &p.columns, 0, 0, "LIST", "write these columns only: NAME,NAME...", NULL, 0},
         {"mark", 0, OPT_FLAG, &p.mark, 0, 0, NULL, "keep all rows and add the column CUT", NULL, 0},
@@ -251,7 +251,7 @@ int main(int argc, char **argv)
     struct row_spool *spool = NULL;
     struct starmom stars;
     struct cut_count n = {0};
-    struct cut_where *where = parse_where(&p.where);
+    struct expr *where = parse_where(&p.where);
     if (table_in_open(&in, &t, c.argv[0], c.max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     cuts.locus_mag = p.locus[0];

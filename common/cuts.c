@@ -1,70 +1,11 @@
 /* cuts.c - which objects of a shape catalogue are used. */
 #include "cuts.h"
-#include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-
-int cut_parse(struct cut_where *w, const char *text, struct err *e)
-{
-    size_t n = strcspn(text, "<>=!");
-    size_t name = n;
-    while (name > 0 && isspace((unsigned char)text[name - 1]))
-        name--;
-    if (name == 0 || name >= sizeof w->name || strcspn(text, " \t") < name)
-        return err_set(e, E_DATA, "'%s': no column name: write NAME<VALUE", text);
-    if (!text[n])
-        return err_set(e, E_DATA, "'%s': no comparison: one of < <= > >= = !=", text);
-    int op = text[n++];
-    if (text[n] == '=') {
-        op = op == '<' ? 'l' : op == '>' ? 'g' : op;
-        n++;
-    } else if (op == '!') {
-        return err_set(e, E_DATA, "'%s': write != for not equal", text);
-    }
-    while (isspace((unsigned char)text[n]))
-        n++;
-    const char *value = text + n;
-    size_t len = strlen(value);
-    if (len == 0 || len >= sizeof w->text || strpbrk(value, " \t<>=!"))
-        return err_set(e, E_DATA, "'%s': no value after the comparison", text);
-    char *end;
-    double v = strtod(value, &end);
-    int number = *end == '\0' && isfinite(v) && !strpbrk(value, "xXpP");
-    if (!number && op != '=' && op != '!')
-        return err_set(e, E_DATA, "'%s': '%s' is not a number", text, value);
-    memset(w, 0, sizeof *w);
-    memcpy(w->name, text, name);
-    memcpy(w->text, value, len);
-    w->op = op;
-    w->value = number ? v : NAN;
-    return OK;
-}
 
 double cuts_size(const struct cuts *c, double dstar)
 {
     return c->factor * sqrt(dstar * dstar + c->floor);
-}
-
-static int compare(double v, int op, double with)
-{
-    switch (op) {
-    case '<': return v < with;
-    case '>': return v > with;
-    case 'l': return v <= with;
-    case 'g': return v >= with;
-    case '=': return v == with;
-    default: return v < with || v > with;      /* != : a missing value fails too */
-    }
-}
-
-static int where_holds(const struct cut_where *w, const struct column *c, size_t row)
-{
-    if (c->type == COL_TEXT) {
-        int equal = strcmp(c->v.s[row], w->text) == 0;
-        return w->op == '=' ? equal : !equal;
-    }
-    return compare(table_number(c, row), w->op, w->value);
 }
 
 /* A column of numbers, or E_MISSING with its name. */
@@ -141,7 +82,7 @@ static int64_t row_bits(const struct cuts *c, const struct used *u, size_t i)
     return bits;
 }
 
-int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, const struct cut_where *where,
+int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, const struct expr *where,
                int64_t *bits, struct cut_count *count, struct err *e)
 {
     struct used u = {0};
@@ -150,18 +91,16 @@ int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, cons
         return st;
     if (!c->only_where && c->which != DSTAR_EACH && !(c->dstar >= 0))
         return err_set(e, E_MISSING, "no size of the stars: give --stars FILE");
-    for (size_t k = 0; k < n_where; k++) {
-        const struct column *col = table_find(t, where[k].name);
-        if (!col || col->type == COL_RAGGED)
-            return err_set(e, E_MISSING, "no column %s", where[k].name);
-        if (col->type == COL_TEXT ? where[k].op != '=' && where[k].op != '!' : isnan(where[k].value))
-            return err_set(e, E_DATA, "column %s cannot be compared with '%s'", where[k].name, where[k].text);
-    }
+    const struct column **col = malloc((n_where * EXPR_NODES + 1) * sizeof *col);
+    if (!col)
+        return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
+    for (size_t k = 0; k < n_where && st == OK; k++)
+        st = expr_bind(&where[k], t, col + k * EXPR_NODES, e);
     struct cut_count n = {.all = t->nrow};
-    for (size_t i = 0; i < t->nrow; i++) {
+    for (size_t i = 0; i < t->nrow && st == OK; i++) {
         int64_t b = c->only_where ? 0 : row_bits(c, &u, i);
         for (size_t k = 0; k < n_where; k++)
-            if (!where_holds(&where[k], table_find(t, where[k].name), i))
+            if (!expr_holds(&where[k], col + k * EXPR_NODES, i))
                 b |= CUT_WHERE;
         bits[i] = b;
         n.stars += !(b & CUT_STAR);
@@ -170,6 +109,8 @@ int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, cons
         n.snr += !(b & (CUT_STAR | CUT_ELLIPTICITY | CUT_SIZE | CUT_SNR));
         n.where += b == 0;
     }
-    *count = n;
-    return OK;
+    free(col);
+    if (st == OK)
+        *count = n;
+    return st;
 }

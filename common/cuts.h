@@ -1,11 +1,12 @@
 /*
  * cuts.h - which objects of a shape catalogue are used: the paper's cuts in
- * their order, and comparisons of any column with a value.
+ * their order, and any conditions on any columns.
  */
 #ifndef PIXSHEAR_CUTS_H
 #define PIXSHEAR_CUTS_H
 
 #include "err.h"
+#include "expr.h"
 #include "starmom.h"
 #include "table.h"
 #include <stddef.h>
@@ -24,7 +25,7 @@ enum cut_bit {
 enum dstar { DSTAR_MIN, DSTAR_OWN, DSTAR_EACH };
 
 struct cuts {
-    int only_where;           /* the comparisons alone: no column but theirs is needed */
+    int only_where;           /* the conditions alone: no column but theirs is needed */
     double star_prob;         /* an object with STAR_PROB above is a star */
     double locus_mag;         /* and one with MAG_AUTO below this whose size is that of a star under its own weight */
     double locus_width;       /* to this fraction; 0: no such test */
@@ -42,25 +43,15 @@ struct cuts {
 #define CUTS_DEFAULTS {.star_prob = 0.9, .max_e = 1, .factor = 1.2, .floor = 0.4, .snr = 10, \
                        .sentinel = 2000, .flags = 1 | 4 | 8 | 16 | 32}
 
-struct cut_where {
-    char name[64];
-    int op;                   /* '<' '>' '=' '!' 'l' (<=) 'g' (>=) */
-    double value;
-    char text[64];            /* the value as typed; for columns of words */
-};
-
 struct cut_count {
     size_t all, stars, ellipticity, size, snr, where;    /* objects left after each cut, in this order */
 };
 
-/* "NAME<VALUE" with < <= > >= = == !=. E_DATA: e tells what is wrong. */
-MUST_CHECK int cut_parse(struct cut_where *w, const char *text, struct err *e);
-
 /*
- * bits[i] for every row, and the counts; a missing value fails every
- * comparison.  E_MISSING: e names the column.
+ * bits[i] for every row, and the counts; a missing value fails every cut.
+ * E_MISSING: e names the column.
  */
-MUST_CHECK int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, const struct cut_where *where,
+MUST_CHECK int cuts_apply(const struct table *t, const struct cuts *c, size_t n_where, const struct expr *where,
                           int64_t *bits, struct cut_count *count, struct err *e);
 
 /* factor sqrt(dstar^2 + floor) */

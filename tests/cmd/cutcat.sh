@@ -64,7 +64,12 @@ cutcat in.cat --columns NUMBER --mark -o cols.cat; near "--columns with --mark" 
 fails "--columns: no such column" 1 cutcat in.cat --columns NUMBER,MAG
 fails "star file without DSTAR" 1 cutcat in.cat --stars stars.rrg --dstar own
 grep -v DSTAR in.cat >nod.cat; fails "no d* anywhere" 1 cutcat nod.cat
-fails "malformed comparison" 2 cutcat in.cat --where 'MAG_AUTO<x'
+cutcat in.cat --where 'FLUX_AUTO/FLUXERR_AUTO < 15 || NUMBER >= 4 && NUMBER<7 && !(FLAGS_RRG&32 = 32)' --only-where -o expr.cat
+near "--where with arithmetic, bits and logic" "$(col expr.cat NUMBER | tr -d '\n')" 568 0
+cutcat in.cat --only-where --where 'hypot(E1,E2) < 0.5' --where 'D_RRG > 1.5*D_PSF' -o expr.cat; near "columns against each other; a missing value fails" "$(col expr.cat NUMBER | tr -d '\n')" 1289 0
+fails "malformed condition" 2 cutcat in.cat --where 'MAG_AUTO<'
+fails "a condition without a comparison" 2 cutcat in.cat --where 'MAG_AUTO+1'
+fails "a column that is not there" 1 cutcat in.cat --where 'MAG_AUTO<x'
 fails "unknown column" 1 cutcat in.cat --where 'MAGAUTO<3'
 sed 's/D_RRG/D_OLD/' in.cat >bad.cat; fails "no shapes" 1 cutcat bad.cat
 fails "missing file" 1 cutcat nothere.cat
