@@ -9,7 +9,7 @@ rm -rf quick* paper* tiny*
 # the catalogues of two fields under three shears, and the pictures' numbers
 catalogues() { (cd "$1" && find . -maxdepth 1 \( -name '*.use.fits' -o -name '*.cat' -o -name '*.rrg' -o -name '*.scene' -o -name '*.models' -o -name 'table.txt' -o -name 'psf*.fits' \) | sort | xargs sha256sum); }
 begin=$(date +%s%N)
-make -s tiny FIGURES= PICTURES= >log 2>&1 || fail "the tiny experiment fails: $(tail -3 log)"
+make -s tiny >log 2>&1 || fail "the tiny experiment fails: $(tail -3 log)"     # has a table, no figures
 alone=$(($(date +%s%N) - begin))    # nanoseconds, the measure of the moments below
 catalogues tiny >whole
 between "catalogues of an undisturbed run" "$(grep -c use whole)" 24 24
@@ -44,3 +44,10 @@ ok "and leaves nothing half-made" test ! -e tiny/sim1-0.10-1a.plain.use.fits -a 
 ok "all scales show one sky" test -s tiny/sky.scene -a ! -e tiny/sim1-0.10.scene
 make -s tiny FIGURES= PICTURES= SKY=own OUT=tiny-own tiny.fields=sim1-0.10 tiny.shears=0 >log 2>&1 || fail "SKY=own: $(tail -1 log)"
 ok "SKY=own: each scale its own" test -s tiny-own/sim1-0.10.scene -a ! -e tiny-own/sky.scene
+
+# figures of what has no numbers, or of a run without the scale that they show: told, not half made
+make -s tiny FIGURES="ngal cf" >log 2>&1 && fail "figures of three galaxies must fail"
+ok "figures of three galaxies: told why" grep -q "^optimum: tiny: no scale has all its numbers .*FIGURES= makes the table alone" log
+make -s quick OUT=one quick.fields=sim1-0.14 quick.size=40.96 >log 2>&1 && fail "figures without the reference scale must fail"
+ok "figures without 0.10 arcsec: told before the run" grep -q "^figures show Sim 1 at 0.10 arcsec" log
+ok "and nothing was made" test ! -e one/sim1-0.14-stars.rrg
