@@ -7,7 +7,13 @@ stamp=$(stat -c %Y.%Z out/sim1-0.10-01-1a-mirror-exact.fits)
 ok "the whole" run
 near "what was there stays" "$stamp" "$(stat -c %Y.%Z out/sim1-0.10-01-1a-mirror-exact.fits)" 0
 near "figure" "$(head -c 4 out/slopes.png | grep -ac PNG)" 1 0
-near "sections of the table" "$(grep -c '^==' out/table.txt)" 26 0
+near "sections of the table" "$(grep -c '^==' out/table.txt)" 30 0
+# the paper's formula, 12.65 sigma/sqrt(n) for nine images; two of 0.05 here: sigma/(0.05 sqrt(2 n))
+for k in fit small; do
+    near "$k: error of the slope by the paper's formula" "$(paste <(col out/$k-exact.cat B1SE) <(col out/$k-exact.cat SIGMA1) <(col out/$k-exact.cat N_GAL) | awk '{ print $1 / ($2 / sqrt($3 * 0.46694) / 0.0707107) }')" 1 0.05
+done
+near "all fields are the first ones when there are no more" "$(col out/fit-exact.cat B1)" "$(fom -q --draws 0 out/sim1-0.10-*-own-exact.fits -o x.cat && col x.cat B1)" 0
+between "more galaxies without the 0.4" "$(paste <(col out/small-plain.cat N_GAL) <(col out/fit-plain.cat N_GAL) | awk '{ print $1 / $2 }')" 1.02 2
 near "no images are left" "$(find out -name '*.part*' | wc -l)" 0 0
 exact=$("$BIN/fom" -q --draws 0 out/sim1-0.10-*-{0,1a,1d}-forced-exact.fits -o x.cat && col x.cat BPAIR1)
 plain=$("$BIN/fom" -q --draws 0 out/sim1-0.10-*-{0,1a,1d}-forced-plain.fits -o x.cat && col x.cat BPAIR1)
