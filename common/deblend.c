@@ -10,6 +10,7 @@
  */
 #include "deblend.h"
 #include "grow.h"
+#include "peaks.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,11 +47,12 @@ struct part {              /* an object in the making: its core */
 struct deblend_work {
     struct pixel *pixel;
     int32_t *order, *queue;
-    float *level, *sorted, *line;
+    float *level, *sorted;
     struct peak *peak;
     struct branch *branch;
     struct part *part;
-    size_t cap_pixel, cap_order, cap_queue, cap_level, cap_sorted, cap_peak, cap_branch, cap_part, cap_line;
+    struct peaks peaks;
+    size_t cap_pixel, cap_order, cap_queue, cap_level, cap_sorted, cap_peak, cap_branch, cap_part;
     int32_t npixel, npeak, nbranch, npart;
 };
 
@@ -69,7 +71,7 @@ void deblend_work_free(struct deblend_work *w)
     free(w->queue);
     free(w->level);
     free(w->sorted);
-    free(w->line);
+    peaks_free(&w->peaks);
     free(w->peak);
     free(w->branch);
     free(w->part);
@@ -148,69 +150,6 @@ static int neighbours(const struct deblend_work *w, int32_t i, int32_t out[8])
     for (int k = 0; k < p->downs; k++)
         out[n++] = p->down + k;
     return n;
-}
-
-/* ---- maxima, straight from the runs ---- */
-
-/* The runs of one row, [begin, end), and their values at x0 - left + 1 of a line that is 0 elsewhere. */
-struct line {
-    float *v;
-    const struct run *begin, *end;
-};
-
-static struct line take_line(const struct segments *s, const struct run *from, const struct run *stop, int32_t left, float *v)
-{
-    const struct run *r = from;
-    for (; r < stop && r->y == from->y; r++)
-        memcpy(v + (r->x0 - left + 1), s->smooth + r->at, (size_t)(r->x1 - r->x0) * sizeof *v);
-    return (struct line){v, from, r};
-}
-
-static void clear_line(struct line l, int32_t left)
-{
-    for (const struct run *r = l.begin; r < l.end; r++)
-        memset(l.v + (r->x0 - left + 1), 0, (size_t)(r->x1 - r->x0) * sizeof *l.v);
-}
-
-/* Local maxima of the line; of equal neighbours the last one in reading order counts. */
-static int count_maxima(struct line l, const float *up, const float *down, int32_t left)
-{
-    int n = 0;
-    for (const struct run *r = l.begin; r < l.end; r++)
-        for (int32_t i = r->x0 - left + 1; i <= r->x1 - left; i++) {
-            float v = l.v[i];
-            n += (up[i - 1] < v) & (up[i] < v) & (up[i + 1] < v) & (l.v[i - 1] < v) & (l.v[i + 1] <= v)
-                 & (down[i - 1] <= v) & (down[i] <= v) & (down[i + 1] <= v);
-        }
-    return n;
-}
-
-/* *several = 1 when the component's filtered values, all positive, have at least two local maxima. */
-static int several_maxima(const struct segments *s, size_t c, struct deblend_work *w, int *several)
-{
-    const struct run *first = s->run + s->first[c], *end = s->run + s->first[c + 1];
-    int32_t left = first->x0, right = first->x1;
-    for (const struct run *r = first; r < end; r++) {
-        left = r->x0 < left ? r->x0 : left;
-        right = r->x1 > right ? r->x1 : right;
-    }
-    size_t wide = (size_t)(right - left) + 2;      /* not more than the pixels: they are connected */
-    int st = grow(&w->line, &w->cap_line, 3 * wide, sizeof *w->line);
-    if (st)
-        return st;
-    memset(w->line, 0, 3 * wide * sizeof *w->line);
-    struct line up = {w->line, first, first}, here = take_line(s, first, end, left, w->line + wide);
-    int n = 0;
-    for (float *free_line = w->line + 2 * wide; here.begin < end && n < 2;) {
-        struct line down = take_line(s, here.end, end, left, free_line);
-        n += count_maxima(here, up.v, down.v, left);
-        clear_line(up, left);
-        free_line = up.v;
-        up = here;
-        here = down;
-    }
-    *several = n >= 2;
-    return OK;
 }
 
 /* ---- the flood ---- */
@@ -800,7 +739,7 @@ int deblend_component(const struct segments *s, size_t c, const struct deblend_p
     int32_t first = -1;
     int st = OK, several = p->levels > 1 && p->contrast < 1 && size > 2 * (size_t)p->branch_area;
     if (several)
-        st = several_maxima(s, c, w, &several);
+        st = peaks_several(s, c, p->branch_area, p->contrast, &w->peaks, &several);
     if (!st && several) {
         st = load(w, s, c);
         if (!st) {
