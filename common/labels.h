@@ -29,13 +29,12 @@ void labels_free(struct labels *l);
 /* The first run of row y that ends beyond x, or l->row[y + 1]. */
 static inline size_t labels_from(const struct labels *l, long y, long x)
 {
-    size_t a = l->row[y], b = l->row[y + 1];
-    while (a < b) {
-        size_t m = a + (b - a) / 2;
-        if (l->run[m].x1 > x)
-            b = m;
-        else
-            a = m + 1;
+    size_t a = l->row[y], n = l->row[y + 1] - a;
+    while (n) {                            /* halves without a branch that the processor would have to guess */
+        size_t half = n / 2;
+        size_t skip = l->run[a + half].x1 <= x ? half + 1 : 0;
+        a += skip;
+        n = skip ? n - half - 1 : half;
     }
     return a;
 }

@@ -3,7 +3,6 @@
 #include "err.h"
 #include <ctype.h>
 #include <errno.h>
-#include <gsl/gsl_errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -492,7 +491,6 @@ static void check_names(const struct program *prog, const struct opt *own, const
 void opt_parse(const struct program *prog, const struct opt *own, struct common *c, int argc, char **argv)
 {
     struct parser p = {prog, own, c, argc, argv};
-    gsl_set_error_handler_off();    /* every program starts here; GSL is to report by status */
     c->max_memory = physical_memory();
     c->argv = (const char **)argv + 1;    /* operands move to the front of the array */
     int options = 1;

@@ -368,39 +368,40 @@ WIDE static void stamp_sums(const float *v, long stride, const struct weights *w
 }
 
 /*
- * Sums of I W, I W r^2, W^2 and first moments for W proportional to exp(-r^2 / 2 w2),
- * within 4 sqrt(w2).  line: room for 5 (sides + LANES).
+ * Sums of I W, I W r^2 and first moments for W proportional to exp(-r^2 / 2 w2), within 4 sqrt(w2); of W^2 into *squares
+ * unless that is NULL.  line: room for 5 (sides + LANES).
  */
-static void weighted_sums(const struct stamp *s, double cx, double cy, const struct gauss *g, double *line, double out[5])
+static void weighted_sums(const struct stamp *s, double cx, double cy, const struct gauss *g, double *line, double out[4],
+                          double *squares)
 {
     double reach = 4 * sqrt(g->w2);
     long x0 = cx - reach > 0 ? (long)ceil(cx - reach) : 0, y0 = cy - reach > 0 ? (long)ceil(cy - reach) : 0;
     long x1 = cx + reach < (double)(s->nx - 1) ? (long)floor(cx + reach) + 1 : s->nx;
     long y1 = cy + reach < (double)(s->ny - 1) ? (long)floor(cy + reach) + 1 : s->ny;
-    memset(out, 0, 5 * sizeof *out);
+    memset(out, 0, 4 * sizeof *out);
+    if (squares)
+        *squares = 0;
     if (x1 <= x0 || y1 <= y0)
         return;
     long n = x1 - x0, wide = (n + LANES - 1) / LANES * LANES, rows = y1 - y0;
-    double *wx = line, *dx = line + wide, *wy = line + 2 * wide, *dy = wy + rows, sum[4], line2 = 0, rows2 = 0;
+    double *wx = line, *dx = line + wide, *wy = line + 2 * wide, *dy = wy + rows, line2 = 0, rows2 = 0;
     gaussian_line(g, cx - (double)x0, n, wx);
     gaussian_line(g, cy - (double)y0, rows, wy);
     for (long i = n; i < wide; i++)        /* the stamp has room for LANES more */
         wx[i] = 0;
-    for (long i = 0; i < wide; i++) {
+    for (long i = 0; i < wide; i++)
         dx[i] = (double)(x0 + i) - cx;
-        line2 += wx[i] * wx[i];
-    }
-    for (long y = 0; y < rows; y++) {
+    for (long y = 0; y < rows; y++)
         dy[y] = (double)(y0 + y) - cy;
-        rows2 += wy[y] * wy[y];
-    }
     struct weights w = {wx, dx, wy, dy, wide, rows};
-    stamp_sums(s->v + y0 * s->nx + x0, s->nx, &w, sum);
-    out[0] = sum[0];
-    out[1] = sum[1];
-    out[2] = line2 * rows2;
-    out[3] = sum[2];
-    out[4] = sum[3];
+    stamp_sums(s->v + y0 * s->nx + x0, s->nx, &w, out);
+    if (!squares)
+        return;
+    for (long i = 0; i < n; i++)
+        line2 += wx[i] * wx[i];
+    for (long y = 0; y < rows; y++)
+        rows2 += wy[y] * wy[y];
+    *squares = line2 * rows2;
 }
 
 struct core {
@@ -417,9 +418,9 @@ static struct core fit_core(const struct stamp *s, double cx, double cy, double 
     double w2 = start > 0.3 ? start : 0.3, most = 0.25 * (double)(s->nx * s->nx + s->ny * s->ny);
     double u_last = 0, f_last = 0;
     for (int i = 0; i < 50; i++) {
-        double t[5];
+        double t[4];
         struct gauss g = gauss_of(w2);
-        weighted_sums(s, cx, cy, &g, line, t);
+        weighted_sums(s, cx, cy, &g, line, t, NULL);
         if (!(t[0] > 0 && t[1] > 0))
             break;
         double m = 0.5 * t[1] / t[0];              /* per axis */
@@ -451,11 +452,11 @@ static void window_centroid(const struct stamp *s, double sigma, double *line, d
     double x = s->cx, y = s->cy, last_x = 0, last_y = 0, step_x = 0, step_y = 0;
     struct gauss g = gauss_of(sigma * sigma);
     for (int i = 0; i < 16; i++) {
-        double t[5];
-        weighted_sums(s, x, y, &g, line, t);
+        double t[4];
+        weighted_sums(s, x, y, &g, line, t, NULL);
         if (!(t[0] > 0))
             return;
-        double dx = 2 * t[3] / t[0], dy = 2 * t[4] / t[0], step2 = step_x * step_x + step_y * step_y, slope = 1;
+        double dx = 2 * t[2] / t[0], dy = 2 * t[3] / t[0], step2 = step_x * step_x + step_y * step_y, slope = 1;
         if (step2 > 0)
             slope = ((last_x - dx) * step_x + (last_y - dy) * step_y) / step2;
         slope = slope > 0.2 ? slope < 2 ? slope : 2 : 0.2;
@@ -507,14 +508,14 @@ static double measure_star(const struct field *f, const struct stamp *s, double 
 {
     if (!(f->p->psf_fwhm > 0))
         return 0.5;
-    double t0 = point_variance(f->p->psf_fwhm), w2 = 2.4 * t0 + 0.5, t[5], cx = s->cx, cy = s->cy;
+    double t0 = point_variance(f->p->psf_fwhm), w2 = 2.4 * t0 + 0.5, t[4], squares, cx = s->cx, cy = s->cy;
     struct gauss g = gauss_of(w2);
     window_centroid(s, sqrt(w2), line, &cx, &cy);
-    weighted_sums(s, cx, cy, &g, line, t);
+    weighted_sums(s, cx, cy, &g, line, t, &squares);
     if (!(t[0] > 0 && t[1] > 0))
         return 0;
     double ratio = 0.5 * t[1] / t[0] * (t0 + w2) / (t0 * w2);
-    return star_probability(log(ratio), t[0] / (rms * sqrt(t[2])), f->p->psf_fwhm);
+    return star_probability(log(ratio), t[0] / (rms * sqrt(squares)), f->p->psf_fwhm);
 }
 
 /* ---- all together ---- */

@@ -8,6 +8,7 @@
  */
 #include "pupil.h"
 #include "fft.h"
+#include <gsl/gsl_errno.h>
 #include <gsl/gsl_integration.h>
 #include <math.h>
 #include <stdlib.h>
@@ -359,6 +360,7 @@ static int add_band(const struct pupil *p, double du, int cells, double *re, dou
 {
     int n = p->bandwidth > 0 ? p->wavelengths > 0 ? p->wavelengths : 8 : 1;
     double lambda[512], weight[512], total = 0;
+    gsl_set_error_handler_off();    /* GSL is to report by status */
     gsl_integration_glfixed_table *gl = gsl_integration_glfixed_table_alloc((size_t)n);
     if (!gl)
         return E_NOMEM;

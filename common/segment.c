@@ -25,13 +25,13 @@ struct feeder {
     const struct smooth *filter;
     int negative;
     long next;             /* the row that enters the ring next */
-    float *plain;          /* ring of 2r+1 rows above background, each with r zeros at both ends */
-    float *across;         /* ring of 2r+1 rows filtered along x */
+    float *plain;          /* ring of 2r+2 rows above background, each with r zeros at both ends: one stays behind */
+    float *across;         /* ring of 2r+2 rows filtered along x */
     const float **window;  /* 2r+1 pointers for the column filter */
     float *zero;           /* nx zeros */
     struct mend mend;      /* of images with bad pixels, else empty */
-    unsigned char *kind;   /* ring of 2r+1 rows, what the pixels are; NULL without bad ones */
-    float *rms;            /* ring of 2r+1 rows of the map; NULL likewise */
+    unsigned char *kind;   /* ring of 2r+2 rows, what the pixels are; NULL without bad ones */
+    float *rms;            /* ring of 2r+2 rows of the map; NULL likewise */
 };
 
 static void feeder_free(struct feeder *f)
@@ -55,7 +55,7 @@ static void feeder_seek(struct feeder *f, long y0)
 
 static int feeder_open(struct feeder *f, long y0)
 {
-    size_t nx = (size_t)f->im->nx, r = (size_t)f->filter->radius, n = 2 * r + 1;
+    size_t nx = (size_t)f->im->nx, r = (size_t)f->filter->radius, n = 2 * r + 2;
     f->plain = calloc(n * (nx + 2 * r), sizeof(float));
     f->across = malloc(n * nx * sizeof(float));
     f->window = malloc(n * sizeof *f->window);
@@ -82,7 +82,7 @@ WIDE static void negate(long n, float *v)
 
 static size_t ring_place(const struct feeder *f, long y)
 {
-    long n = 2 * f->filter->radius + 1;
+    long n = 2 * f->filter->radius + 2;
     return (size_t)(((y % n) + n) % n);
 }
 
@@ -181,8 +181,9 @@ struct search {
 
 struct scratch {
     struct feeder feeder;
-    float *smooth;             /* a row */
+    float *smooth;             /* two rows */
     unsigned char *above;      /* a row and zeros up to a multiple of BLOCK */
+    uint64_t *bits;            /* three rows and one of ones: a bit a pixel above the threshold, a word before and behind */
     uint32_t *count;           /* of runs */
     size_t cap_count;
 };
@@ -256,13 +257,33 @@ static uint64_t bits_of(const unsigned char *byte)
     return bits;
 }
 
-/* Runs of the bytes 1 of a row. */
-static int scan_row(struct strip *s, const struct scanned *row, long nx, const unsigned char *above)
+/* Words of a row of bits. */
+static size_t words_of(const struct search *s)
+{
+    return ((size_t)s->im->nx + BLOCK - 1) / BLOCK + 2;
+}
+
+/* The pixels of a word beside and between those of its row. */
+static uint64_t beside(const uint64_t *w)
+{
+    return w[0] << 1 | w[-1] >> 63 | w[0] >> 1 | w[1] << 63;
+}
+
+/* Three rows of bits; one of ones instead of a row that another strip has. */
+struct rows {
+    const uint64_t *up, *here, *down;
+    int alone;                         /* keep pixels that touch no other */
+};
+
+/* The runs of a row. */
+static int scan_row(struct strip *s, const struct scanned *row, long nx, struct rows r)
 {
     long start = -1;
-    for (long x = 0; x < nx; x += BLOCK) {
-        uint64_t bits = bits_of(above + x), change = bits ^ (bits << 1 | (start >= 0));
-        for (; change; change &= change - 1) {
+    for (long x = 0, k = 1; x < nx; x += BLOCK, k++) {
+        uint64_t bits = r.here[k];
+        if (bits && !r.alone)
+            bits &= beside(r.here + k) | r.up[k] | beside(r.up + k) | r.down[k] | beside(r.down + k);
+        for (uint64_t change = bits ^ (bits << 1 | (start >= 0)); change; change &= change - 1) {
             long i = x + __builtin_ctzll(change);
             if (start < 0) {
                 start = i;
@@ -377,27 +398,52 @@ static int prune_strip(struct strip *s, long first, long last, long min_area, st
 
 /* ---- all strips ---- */
 
-/* One strip with a feeder that is open. */
-static int search_strip(const struct search *s, long i, struct scratch *w)
+/* Filter row y of a strip; its bits above the threshold. */
+static void mark_row(const struct search *s, struct scratch *w, struct scanned *row, uint64_t *bits)
 {
     const struct segment_params *p = s->p;
-    long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny;
+    long nx = s->im->nx, y = row->y;
+    float *smooth = w->smooth + (y % 2) * nx;
+    feeder_row(&w->feeder, y, smooth, &row->plain);
+    const float *rms = rms_row(&w->feeder, y);
+    row->smooth = smooth;
+    row->kind = kind_row(&w->feeder, y);
+    if (p->rms_map)
+        cut_by_map(rms ? rms : p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, smooth);
+    mark_above(smooth, p->rms_map ? 0 : (float)(p->threshold * p->noise), nx, w->above);
+    if (row->kind)
+        unmark_bad(row->kind, nx, w->above);
+    bits[0] = bits[words_of(s) - 1] = 0;
+    for (long x = 0; x < nx; x += BLOCK)
+        bits[1 + x / BLOCK] = bits_of(w->above + x);
+}
+
+/*
+ * One strip with a feeder that is open.  A row waits for the next one: most pixels above the threshold are noise and touch no
+ * other, and with a minimum area above 1 they are left out before they become runs.
+ */
+static int search_strip(const struct search *s, long i, struct scratch *w)
+{
+    long nx = s->im->nx, y0 = i * STRIP, y1 = y0 + STRIP < s->im->ny ? y0 + STRIP : s->im->ny, min_area = s->p->min_area;
+    size_t words = words_of(s);
+    uint64_t *ones = w->bits + 3 * words, *last = w->bits + (y0 + 2) % 3 * (long)words;     /* of the row before y0 */
+    struct scanned row = {.y = y0}, next = {0};
     int st = OK;
+    memset(last, y0 > 0 ? 0xff : 0, words * sizeof *last);
     feeder_seek(&w->feeder, y0);
-    for (long y = y0; y < y1 && !st; y++) {
-        struct scanned row = {.y = y, .smooth = w->smooth};
-        feeder_row(&w->feeder, y, w->smooth, &row.plain);
-        const float *rms = rms_row(&w->feeder, y);
-        row.kind = kind_row(&w->feeder, y);
-        if (p->rms_map)
-            cut_by_map(rms ? rms : p->rms_map + (size_t)y * (size_t)nx, (float)p->threshold, nx, w->smooth);
-        mark_above(w->smooth, p->rms_map ? 0 : (float)(p->threshold * p->noise), nx, w->above);
-        if (row.kind)
-            unmark_bad(row.kind, nx, w->above);
-        st = scan_row(&s->strip[i], &row, nx, w->above);
+    mark_row(s, w, &row, w->bits + y0 % 3 * (long)words);
+    for (; row.y < y1 && !st; row = next) {
+        struct rows r = {w->bits + (row.y + 2) % 3 * (long)words, w->bits + row.y % 3 * (long)words, ones, min_area < 2};
+        next = (struct scanned){.y = row.y + 1};
+        if (next.y < y1) {
+            uint64_t *bits = w->bits + next.y % 3 * (long)words;
+            mark_row(s, w, &next, bits);
+            r.down = bits;
+        }
+        st = scan_row(&s->strip[i], &row, nx, r);
     }
     if (!st)
-        st = prune_strip(&s->strip[i], y0 > 0 ? y0 + 1 : 0, y1 < s->im->ny ? y1 - 2 : y1, p->min_area, w);
+        st = prune_strip(&s->strip[i], y0 > 0 ? y0 + 1 : 0, y1 < s->im->ny ? y1 - 2 : y1, min_area, w);
     return st;
 }
 
@@ -412,10 +458,13 @@ static int search_strips(void *ctx, long begin, long end, int worker)
         st = feeder_open(&w->feeder, 0);
         if (st)
             w->feeder = (struct feeder){0};
-        w->smooth = malloc((size_t)s->im->nx * sizeof(float));
+        w->smooth = malloc(2 * (size_t)s->im->nx * sizeof(float));
+        w->bits = calloc(4 * words_of(s), sizeof *w->bits);
         w->above = calloc((size_t)s->im->nx + BLOCK, 1);
-        if (!w->smooth || !w->above)
+        if (!w->smooth || !w->above || !w->bits)
             st = E_NOMEM;
+        else
+            memset(w->bits + 3 * words_of(s), 0xff, words_of(s) * sizeof *w->bits);
     }
     for (long i = begin; i < end && !st; i++)
         st = search_strip(s, i, w);
@@ -432,6 +481,7 @@ static int search_all(struct search *s, long n)
         feeder_free(&s->scratch[i].feeder);
         free(s->scratch[i].smooth);
         free(s->scratch[i].above);
+        free(s->scratch[i].bits);
         free(s->scratch[i].count);
     }
     free(s->scratch);
