@@ -54,6 +54,12 @@ static struct wing wing_of(const struct blob *b, double beta)
     return w;
 }
 
+/* Of m cells the one at c pixels; what lies outside goes to the nearest. */
+static long cell_at(double c, long m)
+{
+    return c > 0 ? c < (double)(m * CELL) ? (long)c / CELL : m - 1 : 0;
+}
+
 static int grid_new(struct grid *g, const struct blob_list *list, long nx, long ny)
 {
     g->mx = nx / CELL + 1;
@@ -69,7 +75,7 @@ static int grid_new(struct grid *g, const struct blob_list *list, long nx, long 
     for (size_t i = list->n; i-- > 0;) {
         double *c = &g->centre[2 * i], xx, xy, yy;
         blob_moments(&list->blob[i], &c[0], &c[1], &xx, &xy, &yy);
-        long cell = (long)c[1] / CELL * g->mx + (long)c[0] / CELL;
+        long cell = cell_at(c[1], g->my) * g->mx + cell_at(c[0], g->mx);
         g->next[i] = g->head[cell];
         g->head[cell] = (int32_t)i;
     }
@@ -84,11 +90,8 @@ static int claim(const struct cleaning *t, size_t i, struct claims *out)
     const struct blob *b = &list->blob[i];
     struct wing w = wing_of(b, t->beta);
     double reach = REACH * w.a;
-    double pad = reach < 1e6 ? reach : 1e6;
-    long c0 = w.x > pad ? (long)(w.x - pad) / CELL : 0, c1 = (long)(w.x + pad) / CELL;
-    long r0 = w.y > pad ? (long)(w.y - pad) / CELL : 0, r1 = (long)(w.y + pad) / CELL;
-    c1 = c1 < g->mx ? c1 : g->mx - 1;
-    r1 = r1 < g->my ? r1 : g->my - 1;
+    long c0 = cell_at(w.x - reach, g->mx), c1 = cell_at(w.x + reach, g->mx);
+    long r0 = cell_at(w.y - reach, g->my), r1 = cell_at(w.y + reach, g->my);
     for (long r = r0; r <= r1; r++)
         for (long c = c0; c <= c1; c++)
             for (int32_t j = g->head[r * g->mx + c]; j >= 0; j = g->next[j]) {
@@ -124,11 +127,13 @@ static int claim_some(void *ctx, long begin, long end, int worker)
 static void settle_claims(const struct claims *of, long tasks, int32_t *into, double *light)
 {
     for (long k = 0; k < tasks; k++)
-        for (const struct claim *c = of[k].claim, *end = c + of[k].n; c < end; c++)
+        for (size_t i = 0; i < of[k].n; i++) {
+            const struct claim *c = &of[k].claim[i];
             if (c->light > light[c->victim]) {
                 light[c->victim] = c->light;
                 into[c->victim] = c->owner;
             }
+        }
 }
 
 int clean_objects(struct blob_list *list, double beta, long nx, long ny, struct par_team *team, int32_t *into)

@@ -736,6 +736,15 @@ static struct blob sum_again(const struct field *f, const struct blob *blob, int
     return b;
 }
 
+/* A value of a float32 column. */
+static void limit(double *v, long *flags)
+{
+    if (fabs(*v) <= FLT_MAX)
+        return;
+    *v = copysign(FLT_MAX, *v);
+    *flags |= DETECT_APERTURE;
+}
+
 int photometry_measure(const struct field *f, const struct blob *blob, int32_t index,
                        struct photometry_work *w, struct object *out, double *aperture)
 {
@@ -753,6 +762,12 @@ int photometry_measure(const struct field *f, const struct blob *blob, int32_t i
         return st;
     if (touches_bad(f, blob, index + 1))
         o.flags |= DETECT_ISOPHOTE;
+    limit(&o.flux_iso, &o.flags);
+    limit(&o.err_iso, &o.flags);
+    limit(&o.flux_auto, &o.flags);
+    limit(&o.err_auto, &o.flags);
+    for (size_t k = 0; k < 2 * f->p->napertures; k++)
+        limit(&aperture[k], &o.flags);
     *out = o;
     return OK;
 }

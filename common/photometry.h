@@ -22,7 +22,7 @@ enum {
     DETECT_CROWDED = 1,        /* more than a tenth of the AUTO ellipse is neighbours or bad pixels */
     DETECT_SATURATED = 4,      /* a pixel of the isophote is at or above the saturation level */
     DETECT_EDGE = 8,           /* the isophote touches the border of the image */
-    DETECT_APERTURE = 16,      /* an aperture is cut by the border, or its sum has no meaning (flux <= 0) */
+    DETECT_APERTURE = 16,      /* an aperture is cut by the border, or its sum has no meaning (flux <= 0) or is beyond float32 */
     DETECT_ISOPHOTE = 32       /* the isophote touches a bad pixel */
 };
 

@@ -238,7 +238,7 @@ static int add_run(struct strip *s, const struct scanned *row, long x0, long x1)
     float *to = s->pair + 2 * s->npix;
     const float *smooth = row->smooth + x0, *plain = row->plain + x0;
     for (size_t i = 0; i < n; i++) {
-        to[2 * i] = smooth[i];
+        to[2 * i] = smooth[i] <= FLT_MAX ? smooth[i] : FLT_MAX;    /* sums of two values above 1.7e38 overflow */
         to[2 * i + 1] = plain[i];
     }
     s->npix += n;
@@ -494,7 +494,9 @@ static int search_all(struct search *s, long n)
 static struct row border_row(const struct strip *s, int last, uint32_t number)
 {
     size_t n = 0;
-    const struct stretch *end = s->run + (last && s->nrun ? s->nrun - 1 : 0);
+    if (s->nrun == 0)
+        return (struct row){0};
+    const struct stretch *end = s->run + (last ? s->nrun - 1 : 0);
     while (n < s->nrun && (last ? end - n : end + n)->y == end->y)
         n++;
     return last ? (struct row){s->run + s->nrun - n, n, number + (uint32_t)(s->nrun - n)} : (struct row){s->run, n, number};
@@ -539,7 +541,8 @@ static int count_components(struct segments *s, const struct strip *strip, long 
         return E_NOMEM;
     i = 0;
     for (long k = 0; k < n; k++)
-        for (const struct stretch *r = strip[k].run, *end = r + strip[k].nrun; r < end; r++, i++) {
+        for (size_t j = 0; j < strip[k].nrun; j++, i++) {
+            const struct stretch *r = &strip[k].run[j];
             if (parent[i] == i)
                 number[i] = number[i] >= (size_t)min_area ? (uint32_t)++s->ncomponent : 0;
             uint32_t c = number[parent[i]];
@@ -577,7 +580,8 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
         s->first[c + 2] += s->first[c + 1];
     for (long k = 0; k < n && !st; k++) {
         const float *pair = strip[k].pair;
-        for (const struct stretch *r = strip[k].run, *end = r + strip[k].nrun; r < end; r++, i++) {
+        for (size_t j = 0; j < strip[k].nrun; j++, i++) {
+            const struct stretch *r = &strip[k].run[j];
             size_t many = (size_t)(r->x1 - r->x0);
             uint32_t c = number[parent[i]];
             if (c) {

@@ -69,6 +69,25 @@ for e in 1e20 1e-20 -1; do
     rows "values times $e" 2 2 scaled.fits
     near "flux over the factor, and of the other half of it" "$(col rows.cat FLUX_AUTO | sort -g | awk -v e=$e '{ v[NR] = $1 / e } END { print v[2] / v[1] }')" 2 0.1
 done
+# values whose filtered sums leave float32: found where they are, flagged where a flux is beyond it, in FITS tables too
+for v in 1e37 2e38 3e38; do
+    img huge.fits 100 100 "(\$x > 45 && \$y > 50) ? $v : \$x * 7919 % 13" "${K[@]}"
+    rows "a corner of $v" 1 20 huge.fits
+    near "the largest object holds it, flagged 16" "$(awk '/^#/ { k = split($0, h, " "); for (i = 2; i <= k; i++) c[h[i]] = i - 1; next } $c["FLUX_MAX"] > 9e36 && $c["X_IMAGE"] > 60 && $c["Y_IMAGE"] > 60 { s += int($c["FLAGS"] / 16) % 2 } END { print s + 0 }' rows.cat)" 1 0
+    detect -q --columns +FLUX_ISO huge.fits -o huge.cat.fits
+    cutcat --only-where --where "FLUX_MAX>9e36" huge.cat.fits -o huge.txt 2>cmd.err
+    near "finite in its FITS table" "$(col huge.txt FLUX_ISO | awk '$1 > 9e36 && $1 < 3.5e38' | wc -l)" 1 0
+    for side in 3 5; do
+        img huge.fits 100 100 "abs(\$x - 50) < $side / 2 && abs(\$y - 40) < $side / 2 ? $v : \$x * 7919 % 13" "${K[@]}"
+        rows "a square of $side with $v" 1 30 huge.fits
+        near "at its place" "$(awk '/^#/ { k = split($0, h, " "); for (i = 2; i <= k; i++) c[h[i]] = i - 1; next } $c["FLUX_MAX"] > 9e36 { print sqrt(($c["X_IMAGE"] - 51)^2 + ($c["Y_IMAGE"] - 41)^2) }' rows.cat)" 0 0.01
+    done
+done
+img huge.fits 100 100 '1e37 * n() + 1e40 * exp(-(($x - 50) ** 2 + ($y - 40) ** 2) / 18)' "${K[@]}"
+rows "a Gaussian whose centre is infinite, on noise of 1e37" 1 3 huge.fits -t 5
+near "flagged 32" "$(flag 32 51 41)" 1 0
+img huge.fits 100 100 '($x + $y) % 2 ? 3e38 : -3e38' "${K[@]}"
+rows "a checkerboard of +-3e38" 0 5000 huge.fits --rms 1e30
 img sat.fits 160 160 'my $v = 50 + 3 * n() + 3000 * exp(-(($x - 80) ** 2 + ($y - 80) ** 2) / 200) + 300 * exp(-(($x - 30) ** 2 + ($y - 120) ** 2) / 18); $v > 200 ? 200 : $v' "${K[@]}" "SATURATE=                200.0"
 rows "saturated plateaus" 2 4 sat.fits
 near "the large one flagged 4" "$(flag 4 81 81)" 1 0
