@@ -95,7 +95,12 @@ near "one for each with a position that is a number" "$(grep -c '^ellipse' im.re
 near "red where there is a flag" "$(grep -c 'color=red text' im.reg)" "$(paste <(col reg.out FLAGS_RRG) <(col reg.out X_RRG) | grep -v nan | awk '$1' | wc -l)" 0
 fails "--region is the output" 2 rrgshape im.fits im.cat --psf none --region reg.out -o reg.out
 stamp 64 64 "27 30 20 2" >map.fits; cp map.fits map.kept
-for o in im.cat map.fits; do fails "--region is an input, $o" 1 rrgshape im.fits im.cat --psf none --weight map.fits --segmentation map.fits --region $o -o reg.out; done
+for o in im.cat map.fits; do
+    fails "--region is an input, $o, by its name" 2 rrgshape im.fits im.cat --psf none --weight map.fits --segmentation map.fits --region $o -o reg.out
+    ln -f $o one.reg
+    fails "--region is an input, $o, by another name" 1 rrgshape im.fits im.cat --psf none --weight map.fits --segmentation map.fits --region one.reg -o reg.out
+    rm one.reg
+done
 same "and stays" map.fits map.kept
 printf '1 1e300 30 1e300 1e300\n2 20 30 2.5 2.5\n' | rows >far.cat
 ok "--region of a position beyond everything" rrgshape im.fits far.cat --psf none --region far.reg -o far.out
@@ -189,7 +194,9 @@ if [ -x "$BIN/psfgen" ]; then
     for o in st.fits st.cat; do
         cp $o kept
         fails "stars measured in the same run: the output is $o" 1 rrgshape -q im.fits im.cat --stars st.fits,st.cat -o $o
-        fails "the region file is $o" 1 rrgshape -q im.fits im.cat --stars st.fits,st.cat --region $o -o reg.out
+        ln -f $o one.reg
+        fails "the region file is $o by another name" 1 rrgshape -q im.fits im.cat --stars st.fits,st.cat --region one.reg -o reg.out
+        rm one.reg
         same "and $o stays" $o kept
     done
     near "E1ERR_STARS against the scatter of E1 over 12 star fields" "$(scatter E1)" 1 0.63
