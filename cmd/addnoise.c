@@ -57,8 +57,10 @@ static double psf_area(const struct request *r, const struct common *c)
     if (image_read(&im, r->psf, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     double scale = r->psf_scale;
-    if (isnan(scale))
-        scale = header_double_or(&im.hdr, "PIXELSCL", header_double_or(&im.hdr, "PIXSCALE", NAN));
+    static const char *const key[] = {"PIXELSCL", "PIXSCALE"};
+    for (int i = 0; i < 2 && isnan(scale); i++)
+        if (header_double(&im.hdr, key[i], &scale) == E_DATA)
+            die(EXIT_RUN, "%s: %s is not a number: correct the keyword", r->psf, key[i]);
     if (!(scale > 0))
         die(EXIT_RUN, "%s: no keyword PIXELSCL: give --psf-scale", r->psf);
     double area = noise_psf_area((long)image_count(&im), im.pix, scale);

@@ -112,7 +112,7 @@ int exposure_keywords(const struct header *h, const char *label, struct exposure
         {"EXPTIME", &new.exptime}, {"TOTTIME", &new.tottime}, {"MAGZERO", &new.magzero},
         {"PIXSCALE", &new.scale}, {"GAIN", &new.gain},
     };
-    static const char *const others[] = {"SKYLEVEL", "SATURATE", "RDNOISE", "NOISECOR", "PSFFWHM", "CCDSCALE"};   /* read where they are needed */
+    static const char *const others[] = {"SKYLEVEL", "SATURATE", "RDNOISE", "NOISECOR", "PSFFWHM", "CCDSCALE", "SHEAR1", "SHEAR2", "CHDIFF"};   /* read where they are needed */
     double v;
     int st = OK;
     for (size_t i = 0; i < sizeof want / sizeof *want && st == OK; i++)
@@ -121,6 +121,12 @@ int exposure_keywords(const struct header *h, const char *label, struct exposure
         st = number(h, label, others[i], &v, e);
     if (st)
         return st;
+    int subtracted;
+    long whole;
+    if (header_bool(h, "SKYSUB", &subtracted) == E_DATA)
+        return err_set(e, E_DATA, "%s: SKYSUB is neither T nor F: correct the keyword", label);
+    if (header_long(h, "EXPNUM", &whole) == E_DATA)
+        return err_set(e, E_DATA, "%s: EXPNUM is not a whole number: correct the keyword", label);
     new.unit = unit_of(h);
     if (isnan(new.tottime))
         new.tottime = new.exptime;

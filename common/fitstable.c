@@ -122,13 +122,20 @@ static int parse_meaning(struct fits_rows *r, struct field *c, size_t number)
     char key[32];
     long null;
     snprintf(key, sizeof key, "TSCAL%zu", number);
-    c->scale = header_double_or(h, key, 1);
+    c->scale = 1;
+    int st = header_double(h, key, &c->scale);
+    if ((st && st != E_MISSING) || c->scale == 0)
+        return bad(r, c, "%s is not a number, or 0", key);
     snprintf(key, sizeof key, "TZERO%zu", number);
-    c->zero = header_double_or(h, key, 0);
+    st = header_double(h, key, &c->zero);
+    if (st && st != E_MISSING)
+        return bad(r, c, "%s is not a number", key);
     snprintf(key, sizeof key, "TNULL%zu", number);
-    int st = header_long(h, key, &null);
+    st = header_long(h, key, &null);
     if (st != OK && st != E_MISSING)
         return bad(r, c, "%s is not a whole number", key);
+    if (st == OK && strchr("PQ", c->letter))
+        return bad(r, c, "%s of a variable-length column is not read", key);
     c->has_null = st == OK;
     c->null = c->has_null ? null : 0;
     switch (c->letter) {
@@ -267,8 +274,9 @@ static int read_ragged(struct fits_rows *r, const struct field *c, struct column
     uint64_t n = big_endian(p, half), at = big_endian(p + half, half);
     uint64_t main = r->u->axis[0] * r->u->axis[1], heap = main;
     long theap;
-    if (header_long(&r->u->cards, "THEAP", &theap) == OK)
-        heap = theap < 0 ? UINT64_MAX : (uint64_t)theap;
+    const int given = header_long(&r->u->cards, "THEAP", &theap);
+    if (given != E_MISSING)
+        heap = given || theap < 0 ? UINT64_MAX : (uint64_t)theap;
     if (heap < main || heap > r->u->data_size)
         return bad(r, c, "THEAP is out of range");
     uint64_t room = r->u->data_size - heap;

@@ -103,6 +103,12 @@ static int hermitian(size_t count, const double *re, const double *im)
     return worst <= tol;
 }
 
+/* Numbers that may be missing; a card that holds something else is an error. */
+static int optional(const char *name, const struct header *h, const char *key, double *value, struct err *e)
+{
+    return header_double(h, key, value) == E_DATA ? err_set(e, E_DATA, "%s: %s is not a number: correct the keyword", name, key) : OK;
+}
+
 static int read_otf(struct fits_in *f, const char *name, int index, const struct psf_options *o, struct otf *t,
                     struct psf_info *info, const struct header *h, struct err *e)
 {
@@ -117,11 +123,13 @@ static int read_otf(struct fits_in *f, const char *name, int index, const struct
     if (cx != middle || cy != middle || !(dx > 0) || fabs(dx - dy) > 1e-12 * dx)
         return err_set(e, E_DATA, "%s: extension OTF: u = 0 is not in the middle or CDELT not square: write it again with psfgen",
                        name);
-    int status = all_rows(f, name, index, o->max_memory, &v, e);
+    double ucut = dx * (middle - 1);
+    int status = optional(name, h, "UCUT", &ucut, e);
+    if (status == OK)
+        status = all_rows(f, name, index, o->max_memory, &v, e);
     if (status)
         return status;
     size_t count = (size_t)d->nx * (size_t)d->nx;
-    double ucut = header_double_or(h, "UCUT", dx * (middle - 1));
     if (o->cutoff > 0)
         ucut = fmin(ucut, o->cutoff);
     status = check_sum(name, v[count / 2], e);
@@ -177,19 +185,22 @@ static int read_samples(struct fits_in *f, const char *name, int index, const st
     if (d->nz != 1)
         return err_set(e, E_DATA, "%s: a cube of %ld planes: choose one PSF and write it as an image", name, d->nz);
     int status = sampling(name, h, o, &scale, e);
+    double cx = (double)(d->nx + 1) / 2, cy = (double)(d->ny + 1) / 2, unused, nyquist = 0.5 / scale, ucut = nyquist;
+    if (status == OK)
+        status = optional(name, h, "UCUT", &ucut, e);
+    if (status == OK && header_double(h, "GS_SCALE", &unused)) {     /* GalSim draws at the middle; its CRPIX is that of its coordinates */
+        status = optional(name, h, "CRPIX1", &cx, e);
+        if (status == OK)
+            status = optional(name, h, "CRPIX2", &cy, e);
+    }
     if (status == OK)
         status = all_rows(f, name, index, o->max_memory, &v, e);
     if (status)
         return status;
     size_t count = (size_t)d->nx * (size_t)d->ny;
-    double sum = 0, nyquist = 0.5 / scale, ucut = header_double_or(h, "UCUT", nyquist);
+    double sum = 0;
     for (size_t i = 0; i < count; i++)
         sum += v[i];
-    double cx = (double)(d->nx + 1) / 2, cy = (double)(d->ny + 1) / 2, unused;
-    if (header_double(h, "GS_SCALE", &unused)) {       /* GalSim draws at the middle; its CRPIX is that of its coordinates */
-        cx = header_double_or(h, "CRPIX1", cx);
-        cy = header_double_or(h, "CRPIX2", cy);
-    }
     ucut = o->cutoff > 0 ? o->cutoff : ucut > 0 ? ucut : nyquist;
     status = check_sum(name, sum, e);
     if (status == OK && !(cx >= 0.5 && cx <= (double)d->nx + 0.5 && cy >= 0.5 && cy <= (double)d->ny + 0.5))

@@ -58,3 +58,33 @@ same "catalogues without PIXSCALE are of their image's pixels" <(col known.one E
 # a column HISTORY: the text written of it could not be read
 printf '# A B\n1 2\n' >a.txt; cutcat --only-where a.txt -o a.fits; perl -pe "s/'A       '/'HISTORY '/" a.fits >history.fits
 fails "a FITS table with a column HISTORY" 1 cutcat --only-where history.fits
+
+# numbers of images, PSFs and FITS tables: the same
+spoilt() { # FILE KEYWORD VALUE: every card of that name, else the first HISTORY, holds the value
+    perl -e 'local $/; binmode STDIN; $_ = <STDIN>; my ($k, $v) = @ARGV; my $new = sprintf("%-80s", sprintf("%-8s= %20s", $k, $v)); my $n = 0;
+        for (my $i = 0; $i < length; $i += 80) { if (substr($_, $i, 10) eq sprintf("%-8s= ", $k)) { substr($_, $i, 80) = $new; $n++ } }
+        for (my $i = 0; !$n && $i < length; $i += 80) { if (substr($_, $i, 8) eq "HISTORY ") { substr($_, $i, 80) = $new; $n++ } } print' "$2" "$3" <"$1"
+}
+number() { # KEYWORD VALUE FILE COMMAND...: with BAD the spoilt file
+    local k=$1 v=$2; spoilt "$3" "$k" "$v" >bad.fits; shift 3
+    fails "$1, $k = $v" 1 "${@/BAD/bad.fits}" -o made
+    if grep -q "bad.fits.*$k" cmd.err && [ ! -e made ]; then pass "file and keyword are told"; else fail "$1, $k: $(cat cmd.err)"; fi
+    rm -f made
+}
+for k in SHEAR1 SHEAR2 CHDIFF EXPNUM SKYSUB PSFFWHM; do number $k 0,5 noisy.fits detect BAD; done
+number SKYSUB 1 noisy.fits detect BAD
+number EXPNUM 1.5 true.fits addnoise --depth 27 BAD
+number SHEAR1 0,05 noisy.fits rrgshape BAD cat.txt --psf none
+number UCUT 3,7 psf.fits simage scene.txt --models models.txt -x 0.1 -p BAD
+perl "$TOP/tests/fits.pl" make plain.fits 33 33 'exp(-(($x-16)**2+($y-16)**2)/18)' 'PIXELSCL=                 0.02' 'CRPIX1  =                 17.0' 'CRPIX2  =                 17.0' 'HISTORY a PSF'
+ok "a plain PSF is read" simage scene.txt --models models.txt -x 0.1 -p plain.fits -o made; rm -f made
+for k in PIXELSCL CRPIX1 CRPIX2 UCUT; do number $k 1,7 plain.fits simage scene.txt --models models.txt -x 0.1 -p BAD; done
+number PIXELSCL 0,02 plain.fits addnoise --depth 27 --depth-definition point5 -p BAD true.fits
+printf '# A B\n1 2.5\n' >a.txt; cutcat --only-where a.txt -o a.fits
+for k in TSCAL1 TZERO1 TNULL1 TSCAL2 TZERO2; do number $k 1,5 a.fits cutcat --only-where BAD; done
+number TSCAL2 0 a.fits cutcat --only-where BAD
+spoilt a.fits TSCAL2 2.0D0 >scaled.fits; cutcat --only-where scaled.fits -o scaled.txt
+near "TSCAL2 = 2.0D0 doubles the column" "$(col scaled.txt B)" 5 0
+cutcat --only-where models.txt -o m.fits; n=$(($(grep -m1 '^# ID' models.txt | wc -w) - 1))
+number TNULL$n 1 m.fits galgen -n 2 --library BAD
+number THEAP x m.fits galgen -n 2 --library BAD
