@@ -113,6 +113,9 @@ ok "three galaxies" fom few0 few1 -o few.cat
 grep -q undefined cmd.err && pass "three galaxies: warning says undefined" || fail "no warning: $(cat cmd.err)"
 near "three galaxies: G is nan" "$(col few.cat G | grep -c nan)" 1 0
 grep '^#' few0 >none0; ok "no survivor" fom none0 -o none.cat
+grep -q 'none0: no galaxy is left' cmd.err && grep -q 'undefined.*SIGMA_GAMMA' cmd.err && pass "no survivor: warnings" || fail "no survivor: no warning: $(cat cmd.err)"
+near "no survivor: everything else is nan, nothing infinite" "$(paste -d' ' <(col none.cat G) <(col none.cat SIGMA_E) <(col none.cat SIGMA_EERR) <(col none.cat STDERR) <(col none.cat N_EFF) <(col none.cat LOGDC) <(col none.cat LOGDCBS) <(col none.cat KURT1) | tr ' ' '\n' | grep -cx nan)" 8 0
+near "the table says it too" "$(fom -q --table none0 | tail -1 | grep -o undefined | wc -l)" 13 0
 near "no survivor: n_gal 0" "$(col none.cat N_GAL)" 0 0
 fom few0 few1 --table -q >few.txt; grep -q undefined few.txt && pass "undefined in the table" || fail "no undefined in $(cat few.txt)"
 sed 's/ 0.05 / nan /' a4 >nan4; ok "rows without an error" fom a0 nan4 -o nan.cat
