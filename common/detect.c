@@ -12,7 +12,7 @@
 #include <string.h>
 
 enum { BRANCH = 3 };            /* least pixels of a deblended branch */
-enum { COMPONENTS = 64, OBJECTS = 32 };      /* per task */
+enum { COMPONENTS = 16, OBJECTS = 8 };      /* per task */
 
 void detect_weights(float *map, size_t n, enum weight_type type)
 {

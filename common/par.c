@@ -74,9 +74,17 @@ static int this_place(void)
 
 /* ---- the work ---- */
 
+enum { MOST = 256 };
+
+struct share {
+    long next, end;           /* items not handed out */
+};
+
 struct pool {
     pthread_mutex_t lock;
-    long n, chunk, next;      /* next: first item not handed out */
+    long chunk;
+    int shares;               /* one for all, or one for each worker */
+    struct share share[MOST];
     int status;               /* status of the failure with the lowest item */
     long failed_at;
     par_body *body;
@@ -90,14 +98,33 @@ struct worker {
     int begun, sent;          /* runs; was sent to another processor before */
 };
 
-static int take(struct pool *p, long *begin, long *end)
+static void share_out(struct pool *p, long n, int shares)
+{
+    const long chunks = n / p->chunk + (n % p->chunk > 0);
+    p->shares = shares;
+    for (int k = 0; k < shares; k++) {
+        const long end = chunks * (k + 1) / shares;
+        p->share[k] = (struct share){chunks * k / shares * p->chunk, end == chunks ? n : end * p->chunk};
+    }
+}
+
+/* The next chunk of the worker's own share, or the last one of the largest share left. */
+static int take(struct pool *p, int worker, long *begin, long *end)
 {
     pthread_mutex_lock(&p->lock);
-    int more = p->next < p->n && p->status == OK;
-    if (more) {
-        *begin = p->next;
-        *end = p->n - p->next > p->chunk ? p->next + p->chunk : p->n;
-        p->next = *end;
+    struct share *mine = &p->share[p->shares > 1 ? worker : 0], *from = mine;
+    for (int k = 0; k < p->shares && mine->next >= mine->end; k++)
+        if (p->share[k].end - p->share[k].next > from->end - from->next)
+            from = &p->share[k];
+    int more = from->next < from->end && p->status == OK;
+    if (more && from == mine) {
+        *begin = from->next;
+        *end = from->end - from->next > p->chunk ? from->next + p->chunk : from->end;
+        from->next = *end;
+    } else if (more) {
+        *begin = from->next + (from->end - from->next - 1) / p->chunk * p->chunk;
+        *end = from->end;
+        from->end = *begin;
     }
     pthread_mutex_unlock(&p->lock);
     return more;
@@ -108,7 +135,7 @@ static void *work(void *arg)
     struct worker *w = arg;
     struct pool *p = w->pool;
     long begin, end;
-    while (take(p, &begin, &end)) {
+    while (take(p, w->id, &begin, &end)) {
         int st = p->body(p->ctx, begin, end, w->id);
         if (st == OK)
             continue;
@@ -158,7 +185,7 @@ struct member {
 
 struct par_team {
     int made;                 /* threads besides the caller's */
-    struct member member[255];
+    struct member member[MOST - 1];
     pthread_mutex_t lock;
     pthread_cond_t start, done;
     struct pool *pool;        /* what to work on */
@@ -199,14 +226,15 @@ static void *serve(void *arg)
 
 int par_for(long n, long chunk, int threads, par_body *body, void *ctx)
 {
-    if (n < 0 || chunk < 1 || threads < 1 || threads > 256)
+    if (n < 0 || chunk < 1 || threads < 1 || threads > MOST)
         return E_RANGE;
 
-    struct pool p = {.n = n, .chunk = chunk, .body = body, .ctx = ctx};
-    struct worker self[256];
-    pthread_t id[256];
+    struct pool p = {.chunk = chunk, .body = body, .ctx = ctx};
+    struct worker self[MOST];
+    pthread_t id[MOST];
     if (pthread_mutex_init(&p.lock, NULL))
         return E_NOMEM;
+    share_out(&p, n, 1);
     if ((n + chunk - 1) / chunk < threads)
         threads = n > 0 ? (int)((n + chunk - 1) / chunk) : 1;
 
@@ -227,7 +255,7 @@ int par_for(long n, long chunk, int threads, par_body *body, void *ctx)
 
 struct par_team *par_team_new(int threads)
 {
-    struct par_team *t = threads > 1 && threads <= 256 ? calloc(1, sizeof *t) : NULL;
+    struct par_team *t = threads > 1 && threads <= MOST ? calloc(1, sizeof *t) : NULL;
     if (!t)
         return NULL;
     if (pthread_mutex_init(&t->lock, NULL) || pthread_cond_init(&t->start, NULL) || pthread_cond_init(&t->done, NULL)) {
@@ -247,11 +275,12 @@ int par_team_for(struct par_team *team, long n, long chunk, par_body *body, void
 {
     if (n < 0 || chunk < 1)
         return E_RANGE;
-    struct pool p = {.n = n, .chunk = chunk, .body = body, .ctx = ctx};
+    struct pool p = {.chunk = chunk, .body = body, .ctx = ctx};
     struct worker self = {.pool = &p};
     if (pthread_mutex_init(&p.lock, NULL))
         return E_NOMEM;
     const int others = team && n > chunk ? team->made : 0;
+    share_out(&p, n, others + 1);
     if (others) {
         pthread_mutex_lock(&team->lock);
         team->pool = &p;
