@@ -163,11 +163,16 @@ struct stretch {
     uint16_t good;         /* pixels that are not bad */
 };
 
-struct strip {
+/* Runs in reading order with their pixels. */
+struct stretches {
     size_t nrun, cap_run, npix, cap_pair;
     struct stretch *run;
-    uint32_t *parent;      /* of every run: the first one of its component inside the strip */
     float *pair;           /* of every pixel its filtered and its unfiltered value */
+};
+
+struct strip {
+    struct stretches s;
+    uint32_t *parent;      /* of every run: the first one of its component inside the strip */
 };
 
 struct search {
@@ -184,15 +189,16 @@ struct scratch {
     float *smooth;             /* two rows */
     unsigned char *above;      /* a row and zeros up to a multiple of BLOCK */
     uint64_t *bits;            /* three rows and one of ones: a bit a pixel above the threshold, a word before and behind */
-    uint32_t *count;           /* of runs */
-    size_t cap_count;
+    struct stretches found;    /* in the strip in hand */
+    uint32_t *parent, *count;  /* of its runs */
+    size_t cap_parent, cap_count;
 };
 
 static void strip_free(struct strip *s)
 {
-    free(s->run);
+    free(s->s.run);
+    free(s->s.pair);
     free(s->parent);
-    free(s->pair);
     *s = (struct strip){0};
 }
 
@@ -224,7 +230,7 @@ struct scanned {
     const unsigned char *kind;         /* NULL: all are good */
 };
 
-static int add_run(struct strip *s, const struct scanned *row, long x0, long x1)
+static int add_run(struct stretches *s, const struct scanned *row, long x0, long x1)
 {
     size_t n = (size_t)(x1 - x0), good = n;
     int st = grow(&s->run, &s->cap_run, s->nrun + 1, sizeof *s->run);
@@ -276,7 +282,7 @@ struct rows {
 };
 
 /* The runs of a row. */
-static int scan_row(struct strip *s, const struct scanned *row, long nx, struct rows r)
+static int scan_row(struct stretches *s, const struct scanned *row, long nx, struct rows r)
 {
     long start = -1;
     for (long x = 0, k = 1; x < nx; x += BLOCK, k++) {
@@ -339,7 +345,7 @@ static void join_rows(struct row up, struct row here, uint32_t *parent)
 }
 
 /* parent[i] = the first run of run i's component. */
-static void join_strip(const struct strip *s, uint32_t *parent)
+static void join_strip(const struct stretches *s, uint32_t *parent)
 {
     struct row up = {0}, here = {0};
     for (size_t i = 0; i < s->nrun; i++)
@@ -357,43 +363,57 @@ static void join_strip(const struct strip *s, uint32_t *parent)
         parent[i] = parent[parent[i]];
 }
 
+/* Make room for what stays; the runs and pixels are counted. */
+static int strip_new(struct strip *to, const struct stretches *s, const uint32_t *parent, const uint32_t *count, long min_area)
+{
+    size_t runs = 0, pixels = 0;
+    for (size_t i = 0; i < s->nrun; i++)
+        if (count[parent[i]] >= (size_t)min_area) {
+            runs++;
+            pixels += (size_t)(s->run[i].x1 - s->run[i].x0);
+        }
+    to->s.run = malloc((runs + 1) * sizeof *to->s.run);
+    to->s.pair = malloc((2 * pixels + 1) * sizeof *to->s.pair);
+    to->parent = malloc((runs + 1) * sizeof *to->parent);
+    return to->s.run && to->s.pair && to->parent ? OK : E_NOMEM;
+}
+
 /*
- * Find the strip's components and drop those of fewer than min_area good pixels that no row before `first` or behind `last`
- * can go on with: most runs of an image are noise.  What stays keeps its order.
+ * Find the components of what was found and leave out those of fewer than min_area good pixels that no row before `first` or
+ * behind `last` can go on with: most runs of an image are noise.  What stays keeps its order.
  */
-static int prune_strip(struct strip *s, long first, long last, long min_area, struct scratch *w)
+static int prune_strip(struct scratch *w, long first, long last, long min_area, struct strip *to)
 {
     const uint32_t OPEN = 1u << 31;        /* a strip has fewer pixels */
+    const struct stretches *s = &w->found;
     int st = grow(&w->count, &w->cap_count, s->nrun + 1, sizeof *w->count);
-    s->parent = st ? NULL : malloc((s->nrun + 1) * sizeof *s->parent);
-    if (!s->parent)
-        return E_NOMEM;
-    uint32_t *parent = s->parent, *count = w->count;
+    if (!st)
+        st = grow(&w->parent, &w->cap_parent, s->nrun + 1, sizeof *w->parent);
+    if (st)
+        return st;
+    uint32_t *parent = w->parent, *count = w->count;
     join_strip(s, parent);
     memset(count, 0, s->nrun * sizeof *count);
     for (size_t i = 0; i < s->nrun; i++) {
         const struct stretch *r = &s->run[i];
         count[parent[i]] = (count[parent[i]] + r->good) | (r->y < first || r->y > last ? OPEN : 0);
     }
-    float *to = s->pair;
+    st = strip_new(to, s, parent, count, min_area);
     const float *from = s->pair;
-    size_t n = 0;
-    for (size_t i = 0; i < s->nrun; i++) {
+    for (size_t i = 0; i < s->nrun && !st; i++) {
         const struct stretch r = s->run[i];
-        const size_t many = 2 * (size_t)(r.x1 - r.x0);
-        if (parent[i] == i)                /* from here on: 1 + the place of the first run, 0 dropped */
-            count[i] = count[i] >= (size_t)min_area ? (uint32_t)n + 1 : 0;
+        const size_t many = (size_t)(r.x1 - r.x0);
+        if (parent[i] == i)                /* from here on: 1 + the place of the first run, 0 left out */
+            count[i] = count[i] >= (size_t)min_area ? (uint32_t)to->s.nrun + 1 : 0;
         if (count[parent[i]]) {
-            memmove(to, from, many * sizeof *to);
-            to += many;
-            s->run[n] = r;
-            parent[n++] = count[parent[i]] - 1;
+            memcpy(to->s.pair + 2 * to->s.npix, from, 2 * many * sizeof *from);
+            to->s.npix += many;
+            to->s.run[to->s.nrun] = r;
+            to->parent[to->s.nrun++] = count[parent[i]] - 1;
         }
-        from += many;
+        from += 2 * many;
     }
-    s->nrun = n;
-    s->npix = (size_t)(to - s->pair) / 2;
-    return OK;
+    return st;
 }
 
 /* ---- all strips ---- */
@@ -430,6 +450,7 @@ static int search_strip(const struct search *s, long i, struct scratch *w)
     struct scanned row = {.y = y0}, next = {0};
     int st = OK;
     memset(last, y0 > 0 ? 0xff : 0, words * sizeof *last);
+    w->found.nrun = w->found.npix = 0;
     feeder_seek(&w->feeder, y0);
     mark_row(s, w, &row, w->bits + y0 % 3 * (long)words);
     for (; row.y < y1 && !st; row = next) {
@@ -440,10 +461,10 @@ static int search_strip(const struct search *s, long i, struct scratch *w)
             mark_row(s, w, &next, bits);
             r.down = bits;
         }
-        st = scan_row(&s->strip[i], &row, nx, r);
+        st = scan_row(&w->found, &row, nx, r);
     }
     if (!st)
-        st = prune_strip(&s->strip[i], y0 > 0 ? y0 + 1 : 0, y1 < s->im->ny ? y1 - 2 : y1, min_area, w);
+        st = prune_strip(w, y0 > 0 ? y0 + 1 : 0, y1 < s->im->ny ? y1 - 2 : y1, min_area, &s->strip[i]);
     return st;
 }
 
@@ -482,6 +503,9 @@ static int search_all(struct search *s, long n)
         free(s->scratch[i].smooth);
         free(s->scratch[i].above);
         free(s->scratch[i].bits);
+        free(s->scratch[i].found.run);
+        free(s->scratch[i].found.pair);
+        free(s->scratch[i].parent);
         free(s->scratch[i].count);
     }
     free(s->scratch);
@@ -491,7 +515,7 @@ static int search_all(struct search *s, long n)
 /* ---- components of the image: runs are numbered through all strips; there are fewer than 2^15 of them in a row, 2^31 in all ---- */
 
 /* The runs of a strip's first row, or of its last one; number: that of the strip's first run. */
-static struct row border_row(const struct strip *s, int last, uint32_t number)
+static struct row border_row(const struct stretches *s, int last, uint32_t number)
 {
     size_t n = 0;
     if (s->nrun == 0)
@@ -508,15 +532,15 @@ static void join_strips(struct strip *strip, long n, uint32_t *parent, size_t nr
     struct row up = {0};
     uint32_t number = 0;
     for (long k = 0; k < n; k++) {
-        for (size_t i = 0; i < strip[k].nrun; i++)
+        for (size_t i = 0; i < strip[k].s.nrun; i++)
             parent[number + i] = number + strip[k].parent[i];
         free(strip[k].parent);
         strip[k].parent = NULL;
-        struct row here = border_row(&strip[k], 0, number);
+        struct row here = border_row(&strip[k].s, 0, number);
         if (up.n && here.n && up.run->y + 1 == here.run->y)
             join_rows(up, here, parent);
-        up = border_row(&strip[k], 1, number);
-        number += (uint32_t)strip[k].nrun;
+        up = border_row(&strip[k].s, 1, number);
+        number += (uint32_t)strip[k].s.nrun;
     }
     for (size_t i = 0; i < nrun; i++)
         parent[i] = parent[parent[i]];
@@ -531,8 +555,8 @@ static int count_components(struct segments *s, const struct strip *strip, long 
 {
     size_t i = 0, ncomp = 0;
     for (long k = 0; k < n; k++)
-        for (size_t j = 0; j < strip[k].nrun; j++, i++)
-            number[parent[i]] += strip[k].run[j].good;
+        for (size_t j = 0; j < strip[k].s.nrun; j++, i++)
+            number[parent[i]] += strip[k].s.run[j].good;
     for (i = 0; i < nrun; i++)
         ncomp += number[i] >= (size_t)min_area;
     s->first = calloc(ncomp + 2, sizeof *s->first);
@@ -541,8 +565,8 @@ static int count_components(struct segments *s, const struct strip *strip, long 
         return E_NOMEM;
     i = 0;
     for (long k = 0; k < n; k++)
-        for (size_t j = 0; j < strip[k].nrun; j++, i++) {
-            const struct stretch *r = &strip[k].run[j];
+        for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
+            const struct stretch *r = &strip[k].s.run[j];
             if (parent[i] == i)
                 number[i] = number[i] >= (size_t)min_area ? (uint32_t)++s->ncomponent : 0;
             uint32_t c = number[parent[i]];
@@ -563,7 +587,7 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
 {
     size_t nrun = 0, *at = NULL, i = 0;
     for (long k = 0; k < n; k++)
-        nrun += strip[k].nrun;
+        nrun += strip[k].s.nrun;
     uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
     int st = parent && number ? OK : E_NOMEM;
     if (!st) {
@@ -579,9 +603,9 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
     for (size_t c = 0; c < s->ncomponent && !st; c++)
         s->first[c + 2] += s->first[c + 1];
     for (long k = 0; k < n && !st; k++) {
-        const float *pair = strip[k].pair;
-        for (size_t j = 0; j < strip[k].nrun; j++, i++) {
-            const struct stretch *r = &strip[k].run[j];
+        const float *pair = strip[k].s.pair;
+        for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
+            const struct stretch *r = &strip[k].s.run[j];
             size_t many = (size_t)(r->x1 - r->x0);
             uint32_t c = number[parent[i]];
             if (c) {
