@@ -184,7 +184,7 @@ static int label_runs(const struct image *im, const struct split *t, const size_
     struct label_run *run = NULL;
     int st = grow(&run, &cap, s->nrun + 1, sizeof *run);
     for (size_t i = 0; i < s->nrun && !st; i++) {
-        const struct run *r = &s->run[i];
+        const struct run *r = &s->run[s->order[i]];
         const int32_t *mine = t->owner + r->at, *of = number + base[r->component / COMPONENTS];
         int32_t whole = t->whole[r->component];
         for (int32_t x = r->x0, end; x < r->x1 && !st; x = end) {
@@ -198,7 +198,8 @@ static int label_runs(const struct image *im, const struct split *t, const size_
     }
     if (!st)
         st = labels_new(l, im->nx, im->ny, run, n);
-    free(run);
+    if (st)
+        free(run);
     return st;
 }
 

@@ -22,8 +22,8 @@ struct labels {
     size_t *row;               /* ny + 1: where each row begins */
 };
 
-/* Take n runs in any order (no two overlap). E_NOMEM leaves *l alone. Linear time. */
-MUST_CHECK int labels_new(struct labels *l, long nx, long ny, const struct label_run *run, size_t n);
+/* Take n runs, row by row, x rising, no two overlap, in memory from malloc(). E_NOMEM leaves *l and them alone. Linear time. */
+MUST_CHECK int labels_new(struct labels *l, long nx, long ny, struct label_run *run, size_t n);
 void labels_free(struct labels *l);
 
 /* The first run of row y that ends beyond x, or l->row[y + 1]. */

@@ -585,7 +585,7 @@ static int count_components(struct segments *s, const struct strip *strip, long 
 /* The runs and pixels that stay, grouped by component; strips are freed on the way. */
 static int group_runs(struct segments *s, struct strip *strip, long n, long min_area)
 {
-    size_t nrun = 0, *at = NULL, i = 0;
+    size_t nrun = 0, runs = 0, *at = NULL, i = 0;
     for (long k = 0; k < n; k++)
         nrun += strip[k].s.nrun;
     uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
@@ -596,9 +596,10 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
     }
     if (!st) {
         s->run = malloc((s->nrun + 1) * sizeof *s->run);
+        s->order = malloc((s->nrun + 1) * sizeof *s->order);
         s->smooth = malloc((s->npix + 1) * sizeof *s->smooth);
         s->value = malloc((s->npix + 1) * sizeof *s->value);
-        st = s->run && s->smooth && s->value ? OK : E_NOMEM;
+        st = s->run && s->order && s->smooth && s->value ? OK : E_NOMEM;
     }
     for (size_t c = 0; c < s->ncomponent && !st; c++)
         s->first[c + 2] += s->first[c + 1];
@@ -610,6 +611,7 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
             uint32_t c = number[parent[i]];
             if (c) {
                 size_t to = at[c - 1];
+                s->order[runs++] = (uint32_t)s->first[c];
                 s->run[s->first[c]++] = (struct run){r->y, r->x0, r->x1, (int32_t)(c - 1), to};
                 for (size_t x = 0; x < many; x++) {
                     s->smooth[to + x] = pair[2 * x];
@@ -653,6 +655,7 @@ int segment_find(struct segments *s, const struct image *im, const struct backgr
 void segment_free(struct segments *s)
 {
     free(s->run);
+    free(s->order);
     free(s->smooth);
     free(s->value);
     free(s->first);

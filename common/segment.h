@@ -27,6 +27,7 @@ struct run {
 struct segments {
     size_t nrun, npix;
     struct run *run;       /* grouped by component; inside one row by row, x rising, their values one after the other */
+    uint32_t *order;       /* indices into run[] of all runs in reading order */
     float *smooth;         /* npix filtered values above background */
     float *value;          /* npix unfiltered values above background */
     size_t ncomponent;
