@@ -173,7 +173,10 @@ struct stretches {
 struct strip {
     struct stretches s;
     uint32_t *parent;      /* of every run: the first one of its component inside the strip */
+    uint32_t *place;       /* the same memory later: of every run that stays its place among those of the image, else NOWHERE */
 };
+
+static const uint32_t NOWHERE = UINT32_MAX;
 
 struct search {
     const struct image *im;
@@ -199,6 +202,7 @@ static void strip_free(struct strip *s)
     free(s->s.run);
     free(s->s.pair);
     free(s->parent);
+    free(s->place);
     *s = (struct strip){0};
 }
 
@@ -534,7 +538,7 @@ static void join_strips(struct strip *strip, long n, uint32_t *parent, size_t nr
     for (long k = 0; k < n; k++) {
         for (size_t i = 0; i < strip[k].s.nrun; i++)
             parent[number + i] = number + strip[k].parent[i];
-        free(strip[k].parent);
+        strip[k].place = strip[k].parent;
         strip[k].parent = NULL;
         struct row here = border_row(&strip[k].s, 0, number);
         if (up.n && here.n && up.run->y + 1 == here.run->y)
@@ -582,10 +586,56 @@ static int count_components(struct segments *s, const struct strip *strip, long 
     return OK;
 }
 
-/* The runs and pixels that stay, grouped by component; strips are freed on the way. */
-static int group_runs(struct segments *s, struct strip *strip, long n, long min_area)
+/* Every run that stays gets its place; at[c]: where the next pixels of component c go. */
+static void place_runs(struct segments *s, struct strip *strip, long n, const uint32_t *parent, const uint32_t *number, size_t *at)
 {
-    size_t nrun = 0, runs = 0, *at = NULL, i = 0;
+    size_t runs = 0, i = 0;
+    for (size_t c = 0; c < s->ncomponent; c++)
+        s->first[c + 2] += s->first[c + 1];
+    for (long k = 0; k < n; k++)
+        for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
+            const struct stretch *r = &strip[k].s.run[j];
+            uint32_t c = number[parent[i]];
+            strip[k].place[j] = NOWHERE;
+            if (!c)
+                continue;
+            s->run[s->first[c]] = (struct run){r->y, r->x0, r->x1, (int32_t)(c - 1), at[c - 1]};
+            at[c - 1] += (size_t)(r->x1 - r->x0);
+            strip[k].place[j] = s->order[runs++] = (uint32_t)s->first[c]++;
+        }
+}
+
+struct moving {
+    struct segments *s;
+    struct strip *strip;
+};
+
+/* The pixels of strips to their components; the strips are freed. */
+static int move_pixels(void *ctx, long begin, long end, int worker)
+{
+    const struct moving *m = ctx;
+    (void)worker;
+    for (long k = begin; k < end; k++) {
+        struct strip *strip = &m->strip[k];
+        const float *pair = strip->s.pair;
+        for (size_t j = 0; j < strip->s.nrun; j++) {
+            size_t many = (size_t)(strip->s.run[j].x1 - strip->s.run[j].x0);
+            size_t to = strip->place[j] == NOWHERE ? 0 : m->s->run[strip->place[j]].at;
+            for (size_t x = 0; x < many && strip->place[j] != NOWHERE; x++) {
+                m->s->smooth[to + x] = pair[2 * x];
+                m->s->value[to + x] = pair[2 * x + 1];
+            }
+            pair += 2 * many;
+        }
+        strip_free(strip);
+    }
+    return OK;
+}
+
+/* The runs and pixels that stay, grouped by component; strips are freed on the way. */
+static int group_runs(struct segments *s, struct strip *strip, long n, long min_area, struct par_team *team)
+{
+    size_t nrun = 0, *at = NULL;
     for (long k = 0; k < n; k++)
         nrun += strip[k].s.nrun;
     uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
@@ -601,27 +651,10 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
         s->value = malloc((s->npix + 1) * sizeof *s->value);
         st = s->run && s->order && s->smooth && s->value ? OK : E_NOMEM;
     }
-    for (size_t c = 0; c < s->ncomponent && !st; c++)
-        s->first[c + 2] += s->first[c + 1];
-    for (long k = 0; k < n && !st; k++) {
-        const float *pair = strip[k].s.pair;
-        for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
-            const struct stretch *r = &strip[k].s.run[j];
-            size_t many = (size_t)(r->x1 - r->x0);
-            uint32_t c = number[parent[i]];
-            if (c) {
-                size_t to = at[c - 1];
-                s->order[runs++] = (uint32_t)s->first[c];
-                s->run[s->first[c]++] = (struct run){r->y, r->x0, r->x1, (int32_t)(c - 1), to};
-                for (size_t x = 0; x < many; x++) {
-                    s->smooth[to + x] = pair[2 * x];
-                    s->value[to + x] = pair[2 * x + 1];
-                }
-                at[c - 1] += many;
-            }
-            pair += 2 * many;
-        }
-        strip_free(&strip[k]);
+    if (!st) {
+        struct moving m = {s, strip};
+        place_runs(s, strip, n, parent, number, at);
+        st = par_team_for(team, n, 1, move_pixels, &m);
     }
     free(parent);
     free(number);
@@ -641,7 +674,7 @@ int segment_find(struct segments *s, const struct image *im, const struct backgr
         return E_NOMEM;
     int st = search_all(&search, n);
     if (!st)
-        st = group_runs(&out, search.strip, n, p->min_area);
+        st = group_runs(&out, search.strip, n, p->min_area, p->team);
     for (long i = 0; i < n; i++)
         strip_free(&search.strip[i]);
     free(search.strip);
