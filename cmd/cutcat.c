@@ -5,7 +5,6 @@
 #include "opt.h"
 #include "shapecat.h"
 #include "tableio.h"
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -164,9 +163,9 @@ static void add_counts(struct cut_count *n, const struct cut_count *more)
     n->where += more->where;
 }
 
-/* Cut the catalogue block by block into the spool (NULL: only count); t is its header. */
+/* Cut the catalogue block by block (out NULL: only count); t is its header. */
 static void cut_all(struct table_in *in, struct table *t, const struct cuts *c, const struct expr *where, const struct params *p,
-                    const char *name, struct row_spool *spool, struct cut_count *n)
+                    const char *name, struct table_out *out, struct cut_count *n)
 {
     const size_t rows = table_block_rows(t);
     int64_t *bits = malloc(rows * sizeof *bits);
@@ -181,30 +180,15 @@ static void cut_all(struct table_in *in, struct table *t, const struct cuts *c, 
         if (cuts_apply(t, c, p->where.n, where, bits, &more, &e))
             die(EXIT_RUN, "%s: %s", name, e.text);
         add_counts(n, &more);
-        if (!spool)
+        if (!out)
             continue;
         keep_rows(t, bits, p->mark);
         choose_columns(&view, t, p->columns, p->mark);
-        int st = row_spool_add(spool, &view);
-        if (st)
-            die(EXIT_RUN, "%s: cannot spool: %s", name, st == E_IO ? strerror(errno) : err_text(st));
+        if (table_out_rows(out, &view, &e))
+            die(EXIT_RUN, "%s", e.text);
     } while (more.all == rows);
     free(view.col);
     free(bits);
-}
-
-/* The header with the counts, and the rows that wait. */
-static void write_used(const struct table *t, struct row_spool *spool, const struct params *p, const struct common *c, const char *record)
-{
-    struct table head = {0};
-    struct table_rows *rows;
-    struct err e;
-    const char *inputs[] = {c->argv[0], p->stars};
-    choose_columns(&head, t, p->columns, p->mark);
-    check(row_spool_rows(spool, &head, &rows), c->out);
-    if (table_write_rows(&head, rows, c->out, record, inputs, p->stars ? 2 : 1, &e))
-        die(EXIT_RUN, "%s", e.text);
-    free(head.col);
 }
 
 /* --only-where switches every other cut off: one that was asked for must not be lost without a word. */
@@ -246,9 +230,9 @@ int main(int argc, char **argv)
         check_only_where(own, &c);
 
     struct err e;
-    struct table t = {0};
+    struct table t = {0}, head = {0};          /* what is read, and what of it is written */
     struct table_in *in;
-    struct row_spool *spool = NULL;
+    struct table_out *out = NULL;
     struct starmom stars;
     struct cut_count n = {0};
     struct expr *where = parse_where(&p.where);
@@ -258,22 +242,29 @@ int main(int argc, char **argv)
     cuts.locus_width = p.locus[1];
     if (!cuts.only_where)
         find_dstar(&cuts, &stars, &p, c.argv[0], &t, c.max_memory);
-    if (!c.check)
-        check(row_spool_open(&spool), c.argv[0]);
+    const char *inputs[] = {c.argv[0], p.stars};
+    char *record = opt_record(&prog, own, &c);
     if (p.mark && !c.check && !table_find(&t, "CUT"))
         check(table_add(&t, "CUT", COL_INT, "", "cuts failed, see cutcat(1)"), "CUT");
-    cut_all(in, &t, &cuts, where, &p, c.argv[0], spool, &n);
+    if (!c.check) {
+        choose_columns(&head, &t, p.columns, p.mark);
+        if (table_out_open(&out, c.out, inputs, p.stars ? 2 : 1, &e) ||
+            (cuts.only_where && table_out_begin(out, &head, record, &e)))      /* else the counts come into the header */
+            die(EXIT_RUN, "%s", e.text);
+    }
+    cut_all(in, &t, &cuts, where, &p, c.argv[0], out, &n);
     table_in_close(in);
     if (c.verbose || c.check)
         tell(c.argv[0], &n, cuts.only_where);
-    if (!c.check) {
+    if (out) {
         if (!cuts.only_where)
             set_keywords(&t, c.argv[0], &cuts, &n);
-        char *record = opt_record(&prog, own, &c);
-        write_used(&t, spool, &p, &c, record);
-        free(record);
+        choose_columns(&head, &t, p.columns, p.mark);
+        if (table_out_end(out, &head, record, &e))
+            die(EXIT_RUN, "%s", e.text);
     }
-    row_spool_close(spool);
+    free(record);
+    free(head.col);
     free(where);
     table_free(&t);
     opt_free(own);

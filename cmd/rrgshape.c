@@ -8,6 +8,7 @@
 #include "imageio.h"
 #include "opt.h"
 #include "outfile.h"
+#include "progress.h"
 #include "psfio.h"
 #include "region.h"
 #include "shapecat.h"
@@ -31,12 +32,13 @@ struct params {
 
 /* One image with what a measurement on it needs. */
 struct input {
-    const char *name;
+    const char *name, *cat_name;
     long nx, ny;
     float *pix;
     double *pix64;
     struct header hdr;
-    struct table cat;
+    struct table cat;         /* header, and the block of rows read last */
+    struct table_in *rows;
     struct image weight, label;
     struct moments_map map;
     double scale;             /* arcsec per pixel; NaN when unknown */
@@ -129,7 +131,8 @@ static void read_input(struct input *in, const char *image, const char *cat, con
     read_pixels(in, image, max_memory);
     if (exposure_keywords(&in->hdr, image, &x, &e))
         die(EXIT_RUN, "%s", e.text);
-    if (table_read(&in->cat, cat, max_memory, &e))
+    in->cat_name = cat;
+    if (table_in_open(&in->rows, &in->cat, cat, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     in->map = (struct moments_map){.nx = in->nx, .ny = in->ny, .pix = in->pix, .pix64 = in->pix64,
                                    .gain = isfinite(x.gain) ? x.gain : 0,
@@ -147,11 +150,20 @@ static void read_input(struct input *in, const char *image, const char *cat, con
     in->scale = pixel_scale(in, cat, &x, p->scale);
 }
 
+/* The next rows of the catalogue, n at most. */
+static void read_rows(struct input *in, size_t n)
+{
+    struct err e;
+    if (table_in_rows(in->rows, &in->cat, n, &e))
+        die(EXIT_RUN, "%s", e.text);
+}
+
 static void free_input(struct input *in)
 {
     free(in->pix);
     free(in->pix64);
     header_free(&in->hdr);
+    table_in_close(in->rows);
     table_free(&in->cat);
     image_free(&in->weight);
     image_free(&in->label);
@@ -184,7 +196,7 @@ static struct shapecat_options options(const struct params *p, const struct inpu
 }
 
 /* Measure the stars of an image; the median size with their own widths goes to *own. */
-static void measure_stars(struct starmom *s, const struct input *in, const char *cat, const struct params *p,
+static void measure_stars(struct starmom *s, struct input *in, const char *cat, const struct params *p,
                           int threads, double *own)
 {
     struct err e;
@@ -194,6 +206,7 @@ static void measure_stars(struct starmom *s, const struct input *in, const char 
     o.fixed = 0;
     o.moments.fixed_centre = 0;
     size_t n;
+    read_rows(in, SIZE_MAX);
     if (shapecat_stars(&in->cat, &o, 1 / in->scale, &stars, &n, &e))
         fail(cat, &e);
     *s = (struct starmom){.dstar_w = fmax(0.8, 0.1 / in->scale)};
@@ -314,6 +327,17 @@ static size_t inputs_of(const struct params *p, const struct common *c, const ch
     return n;
 }
 
+/* Standard input has only one file to give. */
+static void one_standard_input(const struct params *p, const struct common *c)
+{
+    const char *name[INPUTS];
+    int standard = 0;
+    for (size_t i = 0, n = inputs_of(p, c, name); i < n; i++)
+        standard += strcmp(name[i], "-") == 0;
+    if (standard > 1)
+        die(EXIT_USAGE, "only one input can be standard input, not %d", standard);
+}
+
 /* Every output can be opened: told before the work, and before one of them appears. */
 static void outputs_ready(const struct params *p, const struct common *c)
 {
@@ -337,41 +361,43 @@ static void split_stars(struct params *p)
         die(EXIT_RUN, "%s: %s", p->stars, err_text(E_NOMEM));
 }
 
-static void write_catalogue(const struct table *t, const char *out, const struct program *prog,
-                            const struct opt *own, const struct params *p, const struct common *c)
-{
-    struct err e;
+/* The files that blocks of rows go to; NULL: not asked for. */
+struct outputs {
+    struct table_out *cat, *plain;
+    struct region *region;
+    char *record;
     const char *inputs[INPUTS];
-    const size_t n = inputs_of(p, c, inputs);
-    char *record = opt_record(prog, own, c);
-    if (table_write(t, out, record, inputs, n, &e))
-        die(EXIT_RUN, "%s", e.text);
-    free(record);
+    size_t n_inputs;
+};
+
+static void must(int st, const struct err *e)
+{
+    if (st)
+        die(EXIT_RUN, "%s", e->text);
 }
 
-/* DS9: the second moments as observed, as an ellipse of twice their rms; red with a flag, the weight where there are none. */
-static void write_region(const struct table *t, const struct params *p, const struct common *c)
+/* `head` has the columns and keywords of the catalogues. */
+static void open_outputs(struct outputs *o, const struct table *head, const struct params *p, const struct common *c)
 {
     struct err e;
-    struct region *r;
-    const char *inputs[INPUTS];
-    const size_t n = inputs_of(p, c, inputs);
-    const double *x = table_reals(t, "X_RRG"), *y = table_reals(t, "Y_RRG"), *w = table_reals(t, "WIDTH");
-    const double *xx = table_reals(t, "JXX_RAW"), *xy = table_reals(t, "JXY_RAW"), *yy = table_reals(t, "JYY_RAW");
-    const int64_t *flags = table_ints(t, "FLAGS_RRG");
-    const struct column *number = table_find(t, "NUMBER");
-    if (region_open(&r, p->region, inputs, n, &e))
-        die(EXIT_RUN, "%s", e.text);
-    for (size_t i = 0; i < t->nrow; i++) {
-        const double mean = 0.5 * (xx[i] + yy[i]), half = 0.5 * hypot(xx[i] - yy[i], 2 * xy[i]);
-        const int good = mean - half > 0;
-        if (isfinite(x[i]) && isfinite(y[i]))
-            region_ellipse(r, x[i], y[i], good ? 2 * sqrt(mean + half) : w[i], good ? 2 * sqrt(mean - half) : w[i],
-                           good ? 90 / M_PI * atan2(2 * xy[i], xx[i] - yy[i]) : 0, (size_t)table_number(number, i),
-                           flags[i] ? "red" : NULL);
+    if (p->region)
+        must(region_open(&o->region, p->region, o->inputs, o->n_inputs, &e), &e);
+    must(table_out_open(&o->cat, c->out, o->inputs, o->n_inputs, &e), &e);
+    must(table_out_begin(o->cat, head, o->record, &e), &e);
+    if (p->plain) {
+        must(table_out_open(&o->plain, p->plain, o->inputs, o->n_inputs, &e), &e);
+        must(table_out_begin(o->plain, head, o->record, &e), &e);
     }
-    if (region_close(r, &e))
-        die(EXIT_RUN, "%s", e.text);
+}
+
+static void close_outputs(struct outputs *o, const struct table *head)
+{
+    struct err e;
+    if (o->region)
+        must(region_close(o->region, &e), &e);
+    if (o->plain)
+        must(table_out_end(o->plain, head, o->record, &e), &e);
+    must(table_out_end(o->cat, head, o->record, &e), &e);
 }
 
 /* What the columns need beside themselves: keywords of the image and the PSF. */
@@ -382,61 +408,76 @@ static void set_keywords(struct table *t, const struct input *in, const struct s
         set_psf(t, psf, own, in->scale);
 }
 
-/* Shapes of the galaxies; the catalogue of `in` gets the columns, and *plain those of --plain. */
-static void measure_objects(struct input *in, const struct params *p, const struct common *c, struct table *plain)
+/* Measure the rows read last and send them on; their number with flags. */
+static long measure_block(struct shapecat *s, const struct input *in, const struct outputs *o, const struct rrg_options *plain)
 {
     struct err e;
-    struct moments_object *objects;
+    long bad;
+    check(shapecat_measure(s, &bad), in->cat_name);
+    must(table_out_rows(o->cat, &in->cat, &e), &e);
+    if (o->region)
+        shapecat_region(s, o->region);
+    if (o->plain) {
+        check(shapecat_correct(s, plain), in->cat_name);
+        must(table_out_rows(o->plain, &in->cat, &e), &e);
+    }
+    return bad;
+}
+
+/* Shapes of the galaxies, block by block. */
+static void measure_objects(struct input *in, const struct params *p, const struct common *c, struct outputs *out)
+{
+    struct err e;
+    struct shapecat *shapes;
     struct starmom stars;
+    struct progress bar;
     double own;
+    size_t n = 0;
     long bad = 0;
     if (!(p->fixed > 0))
         need_scale(in);
     struct starmom *psf = find_psf(&stars, in, p, c, &own);
     struct shapecat_options o = options(p, in, c->threads);
-    if (shapecat_objects(&in->cat, &o, &objects, &e))
+    struct rrg_options plain = o.rrg;
+    o.keep = p->plain != NULL;
+    plain.plain = plain.first = 1;
+    if (shapecat_open(&shapes, &in->cat, &in->map, psf, &o, &e))
         fail(c->argv[1], &e);
-    if (c->check) {
-        warn("%s: %zu objects on %ld x %ld pixels of %g arcsec; widths %g to %g px; %s; about %.2g s", c->argv[1], in->cat.nrow,
-             in->nx, in->ny, in->scale, o.min, o.max, psf ? "PSF corrected" : "no PSF correction", 1e-5 * (double)in->cat.nrow);
-        free(objects);
-        return;
-    }
-    double bytes = shapecat_bytes(in->cat.nrow) * (p->plain ? 2 : 1) + (p->plain ? (double)(in->cat.nrow * sizeof *o.raw) : 0);
-    if (c->max_memory > 0 && bytes > c->max_memory)
-        die(EXIT_RUN, "%s: the shapes of %zu objects need %.0f bytes: raise --max-memory", c->argv[1], in->cat.nrow, bytes);
-    if (p->plain) {
-        o.raw = malloc((in->cat.nrow + 1) * sizeof *o.raw);
-        check(o.raw ? table_copy(plain, &in->cat) : E_NOMEM, c->argv[1]);
-    }
-    struct progress bar;
-    progress_begin(&bar, "shapes", (long)in->cat.nrow, c->quiet);
-    int st = shapecat_measure(&in->cat, &in->map, objects, psf, &o, &bar, &bad);
-    progress_end(&bar);
-    if (st == E_DATA)
-        die(EXIT_RUN, "%s: a column with the name of a shape column is of another type", c->argv[1]);
-    check(st, c->argv[1]);
     set_keywords(&in->cat, in, psf, own);
-    if (p->plain) {
-        o.rrg.plain = o.rrg.first = 1;
-        check(shapecat_correct(plain, objects, psf, &o), c->argv[1]);
-        set_keywords(plain, in, psf, own);
-    }
-    if (p->region)
-        write_region(&in->cat, p, c);
-    if (c->verbose)
-        warn("%s: %zu objects, %ld with flags", c->argv[1], in->cat.nrow, bad);
-    free(o.raw);
-    free(objects);
+    if (!c->check)
+        open_outputs(out, &in->cat, p, c);
+    const size_t rows = table_block_rows(&in->cat);
+    progress_begin(&bar, "shapes", -1, c->quiet || c->check);
+    do {
+        read_rows(in, rows);
+        n += in->cat.nrow;
+        if (c->check)
+            continue;
+        bad += measure_block(shapes, in, out, &plain);
+        progress_tick(&bar, (long)in->cat.nrow);
+        progress_part(&bar, table_in_part(in->rows));
+    } while (in->cat.nrow == rows);
+    progress_end(&bar);
+    shapecat_close(shapes);
+    if (c->check)
+        warn("%s: %zu objects on %ld x %ld pixels of %g arcsec; widths %g to %g px; %s; about %.2g s", c->argv[1], n,
+             in->nx, in->ny, in->scale, o.min, o.max, psf ? "PSF corrected" : "no PSF correction", 1e-5 * (double)n);
+    else
+        close_outputs(out, &in->cat);
+    if (c->verbose && !c->check)
+        warn("%s: %zu objects, %ld with flags", c->argv[1], n, bad);
 }
 
 /* The star-moment file instead of a catalogue. */
-static void measure_curve(struct input *in, const struct params *p, const struct common *c, struct table *out)
+static void measure_curve(struct input *in, const struct params *p, const struct common *c, const struct outputs *o)
 {
     struct starmom s;
+    struct table curve = {0}, *out = &curve;
+    struct err e;
     double own;
     if (c->check) {
         need_scale(in);
+        read_rows(in, SIZE_MAX);
         warn("%s: %zu stars on %ld x %ld pixels of %g arcsec; %d widths; about %.2g s", c->argv[1], in->cat.nrow, in->nx, in->ny,
              in->scale, STARMOM_WIDTHS, 2e-3 * (double)in->cat.nrow);
         return;
@@ -449,6 +490,8 @@ static void measure_curve(struct input *in, const struct params *p, const struct
         check(table_history(out, in->cat.history[i]), c->argv[1]);
     check(catkeys_copy(out, &in->hdr), "keywords");     /* the image knows better than the catalogue of another image */
     set_psf(out, &s, own, in->scale);
+    must(table_write(out, c->out, o->record, o->inputs, o->n_inputs, &e), &e);
+    table_free(out);
     if (c->verbose)
         warn("%s: %ld stars, d* = %.4f px at w = %.3f px", c->argv[1], s.stars[0], s.dstar, s.dstar_w);
 }
@@ -486,8 +529,6 @@ int main(int argc, char **argv)
         {"pixel", 0, OPT_REAL, &p.pixel, 0, 1e4, "ARCSEC", "with --psf: side of the pixel that collected the light (0: header)", NULL, 0},
         {0}};
     opt_parse(&prog, own, &c, argc, argv);
-    if (strcmp(c.argv[0], "-") == 0 && strcmp(c.argv[1], "-") == 0)
-        die(EXIT_USAGE, "image and catalogue cannot both be standard input");
     if (!p.stars_only && !p.stars == !p.psf)
         die(EXIT_USAGE, "give one of --stars FILE, --psf FILE, --psf none");
 
@@ -496,24 +537,21 @@ int main(int argc, char **argv)
     if (p.plain && (p.stars_only || outfile_same(p.plain, c.out) || (p.region && outfile_same(p.plain, p.region))))
         die(EXIT_USAGE, "--plain %s: not with --stars-only, and not another output", p.plain);
     split_stars(&p);
+    one_standard_input(&p, &c);
     outputs_ready(&p, &c);
     outfile_together();
     struct err e;
     struct input in;
-    struct table curve = {0}, plain = {0};
+    struct outputs out = {.record = opt_record(&prog, own, &c)};
+    out.n_inputs = inputs_of(&p, &c, out.inputs);
     read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);
     if (p.stars_only)
-        measure_curve(&in, &p, &c, &curve);
+        measure_curve(&in, &p, &c, &out);
     else
-        measure_objects(&in, &p, &c, &plain);
-    if (!c.check && p.plain)
-        write_catalogue(&plain, p.plain, &prog, own, &p, &c);
-    if (!c.check)
-        write_catalogue(p.stars_only ? &curve : &in.cat, c.out, &prog, own, &p, &c);
+        measure_objects(&in, &p, &c, &out);
     if (outfile_appear(&e))
         die(EXIT_RUN, "%s", e.text);
-    table_free(&curve);
-    table_free(&plain);
+    free(out.record);
     free_input(&in);
     free(p.star_image);
     return EXIT_DONE;

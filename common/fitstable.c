@@ -496,6 +496,11 @@ int fits_table_rows(struct fits_rows *r, struct table *t, size_t n, struct err *
     return st;
 }
 
+double fits_table_part(const struct fits_rows *r)
+{
+    return r->u->axis[1] ? (double)r->next / (double)r->u->axis[1] : 1;
+}
+
 void fits_table_close(struct fits_rows *r)
 {
     if (r)

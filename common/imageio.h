@@ -122,6 +122,7 @@ MUST_CHECK int fits_in_table(struct fits_in *f, struct table *t, struct err *e);
 struct fits_rows;
 MUST_CHECK int fits_table_open(struct fits_rows **r, struct fits_in *f, struct table *t, struct err *e);
 MUST_CHECK int fits_table_rows(struct fits_rows *r, struct table *t, size_t n, struct err *e);
+double fits_table_part(const struct fits_rows *r);       /* of the rows that has been read */
 void fits_table_close(struct fits_rows *r);
 /* The array (of E or D) in the first row of a column of the binary table `index`; *v is allocated. */
 MUST_CHECK int fits_in_cell(struct fits_in *f, int index, const char *column, double **v, size_t *count,

@@ -19,8 +19,10 @@ struct progress {
     struct timespec start;
 };
 
-void progress_begin(struct progress *p, const char *what, long total, int quiet);
+void progress_begin(struct progress *p, const char *what, long total, int quiet);   /* total < 0: not known, their count is shown */
 void progress_tick(struct progress *p, long n);   /* n more items are done */
+/* So many of the items, 0..1, were done at the last tick (0: not known): the total becomes an estimate. Not beside other threads' ticks. */
+void progress_part(struct progress *p, double part);
 void progress_end(struct progress *p);            /* wipe the bar */
 
 #endif

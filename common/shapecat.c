@@ -67,7 +67,7 @@ static const struct field fields[] = {
     {"P22", "", "response of E2 to shear 2"},
     {"MASKED", "", "part of the weight covered by neighbours"},
 };
-enum { FIELDS = sizeof fields / sizeof *fields };
+enum { FIELDS = sizeof fields / sizeof *fields, CHUNK = 32 };
 
 static double root(double var)
 {
@@ -102,34 +102,33 @@ static void fill_row(const struct moments *m, const struct rrg *r, double dpsf, 
     p = put(p, (double[]){r->lambda, r->mu[0], r->mu[1], r->p11, r->p22, m->masked}, 6);
 }
 
-int shapecat_objects(const struct table *t, const struct shapecat_options *opt, struct moments_object **objects,
-                     struct err *e)
+enum { NUMBER, X, Y, A, B, SKY, RMS, INPUTS };
+
+/* The columns that a measurement starts from; SKY and RMS may be NULL. */
+static int find_inputs(const struct table *t, const struct column *c[INPUTS], struct err *e)
 {
-    static const char *const need[] = {"NUMBER", "X_IMAGE", "Y_IMAGE", "A_IMAGE", "B_IMAGE"};
-    const struct column *c[5];
-    for (int k = 0; k < 5; k++) {
-        c[k] = table_find(t, need[k]);
-        if (!c[k] || c[k]->type == COL_TEXT || c[k]->type == COL_RAGGED)
-            return err_set(e, E_MISSING, "no column of numbers %s: rrgshape needs NUMBER X_IMAGE Y_IMAGE A_IMAGE B_IMAGE", need[k]);
+    static const char *const name[] = {"NUMBER", "X_IMAGE", "Y_IMAGE", "A_IMAGE", "B_IMAGE", "BACKGROUND", "BACKRMS"};
+    for (int k = 0; k < INPUTS; k++) {
+        c[k] = table_find(t, name[k]);
+        if (k < SKY && (!c[k] || c[k]->type == COL_TEXT || c[k]->type == COL_RAGGED))
+            return err_set(e, E_MISSING, "no column of numbers %s: rrgshape needs NUMBER X_IMAGE Y_IMAGE A_IMAGE B_IMAGE", name[k]);
     }
-    const struct column *sky = table_find(t, "BACKGROUND"), *rms = table_find(t, "BACKRMS");
-    struct moments_object *o = calloc(t->nrow + 1, sizeof *o);
-    if (!o)
-        return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
-    for (size_t i = 0; i < t->nrow; i++) {
-        double w = opt->mult * sqrt(table_number(c[3], i) * table_number(c[4], i));
-        if (!(w > opt->min))
-            w = opt->min;
-        if (w > opt->max)
-            w = opt->max;
-        double noise = rms ? table_number(rms, i) : NAN, level = sky ? table_number(sky, i) : 0;
-        o[i] = (struct moments_object){
-            .x = table_number(c[1], i) - 1, .y = table_number(c[2], i) - 1, .w = opt->fixed > 0 ? opt->fixed : w,
-            .label = table_number(c[0], i), .sky = opt->no_background || !isfinite(level) ? 0 : level,
-            .sky_var = noise >= 0 ? noise * noise : opt->sky_var};
-    }
-    *objects = o;
     return OK;
+}
+
+/* Start position, width, sky of row i. */
+static struct moments_object object_of(const struct column *const c[INPUTS], const struct shapecat_options *opt, size_t i)
+{
+    double w = opt->mult * sqrt(table_number(c[A], i) * table_number(c[B], i));
+    if (!(w > opt->min))
+        w = opt->min;
+    if (w > opt->max)
+        w = opt->max;
+    const double noise = c[RMS] ? table_number(c[RMS], i) : NAN, level = c[SKY] ? table_number(c[SKY], i) : 0;
+    return (struct moments_object){
+        .x = table_number(c[X], i) - 1, .y = table_number(c[Y], i) - 1, .w = opt->fixed > 0 ? opt->fixed : w,
+        .label = table_number(c[NUMBER], i), .sky = opt->no_background || !isfinite(level) ? 0 : level,
+        .sky_var = noise >= 0 ? noise * noise : opt->sky_var};
 }
 
 /* A brighter object of the catalogue is nearer than radius. */
@@ -145,16 +144,18 @@ static int outshone(size_t n, const struct moments_object *o, const struct colum
 int shapecat_stars(const struct table *t, const struct shapecat_options *opt, double radius,
                    struct moments_object **stars, size_t *n, struct err *e)
 {
-    struct moments_object *all = NULL, *out;
-    int st = shapecat_objects(t, opt, &all, e);
+    const struct column *c[INPUTS], *flags = table_find(t, "FLAGS"), *flux = table_find(t, "FLUX_AUTO");
+    int st = find_inputs(t, c, e);
     if (st)
         return st;
-    out = calloc(t->nrow + 1, sizeof *out);
-    if (!out) {
+    struct moments_object *all = calloc(t->nrow + 1, sizeof *all), *out = calloc(t->nrow + 1, sizeof *out);
+    if (!all || !out) {
         free(all);
+        free(out);
         return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
     }
-    const struct column *flags = table_find(t, "FLAGS"), *flux = table_find(t, "FLUX_AUTO");
+    for (size_t i = 0; i < t->nrow; i++)
+        all[i] = object_of(c, opt, i);
     *n = 0;
     for (size_t i = 0; i < t->nrow; i++)
         if ((!flags || table_number(flags, i) < 4) && (!flux || !outshone(t->nrow, all, flux, radius, i)))
@@ -164,17 +165,20 @@ int shapecat_stars(const struct table *t, const struct shapecat_options *opt, do
     return OK;
 }
 
-struct job {
-    const struct moments_map *map;            /* NULL: the moments are in opt->raw */
-    const struct moments_object *objects;
+struct shapecat {
+    struct table *t;
+    const struct moments_map *map;
     const struct starmom *psf;
     const struct shapecat_options *opt;
-    struct rrg_psf first;
+    const struct rrg_options *rrg;            /* of the correction at work */
+    struct rrg_psf first;                     /* the PSF under opt->first_width, its errors */
     double first_cov[STARMOM_N][STARMOM_N];
-    struct moments_scratch *scratch;
-    double *out[FIELDS];
-    int64_t *flags;
-    struct progress *bar;
+    const struct column *input[INPUTS];
+    size_t column[FIELDS], flags;             /* of the table, in the order of fields[] */
+    size_t cap;
+    struct moments *kept;                     /* of every row, with opt->keep */
+    struct par_team *team;
+    struct moments_scratch *scratch;          /* of every thread */
 };
 
 /* A row that cannot be measured at all: position or width is not a number. */
@@ -190,119 +194,175 @@ static struct moments unmeasured(const struct moments_object *o)
 }
 
 /* PSF correction, and the errors of e that the stars leave. */
-static void correct(const struct job *job, const struct moments *m, const struct rrg_psf *own, struct rrg *r, double stars[2])
+static void correct(const struct shapecat *s, const struct moments *m, const struct rrg_psf *own, struct rrg *r, double stars[2])
 {
-    const int first = job->opt->rrg.first && job->psf;
-    const struct rrg_psf *psf = first ? &job->first : own;
+    const int first = s->rrg->first && s->psf;
+    const struct rrg_psf *psf = first ? &s->first : own;
     double here[STARMOM_N][STARMOM_N];
-    rrg_correct(m, psf, &job->opt->rrg, r);
+    rrg_correct(m, psf, s->rrg, r);
     stars[0] = stars[1] = isnan(r->e[0]) ? NAN : 0;
-    if (!job->psf || !(job->psf->err[0][0] > 0))
+    if (!s->psf || !(s->psf->err[0][0] > 0))
         return;
     if (!first)
-        starmom_cov(job->psf, m->w, here);
-    rrg_psf_error(m, psf, &job->opt->rrg, first ? job->first_cov : here, r, stars);
+        starmom_cov(s->psf, m->w, here);
+    rrg_psf_error(m, psf, s->rrg, first ? s->first_cov : here, r, stars);
 }
 
-/* Moments of row i: measured, or from what an earlier measurement kept. */
-static int row_moments(const struct job *job, long i, int worker, struct moments *m)
+static int measure_row(const struct shapecat *s, size_t i, int worker, struct moments *m)
 {
-    struct moments *raw = job->opt->raw ? &job->opt->raw[i] : m;
-    int st = OK;
-    if (job->map)
-        st = moments_measure(job->map, &job->objects[i], &job->opt->moments, &job->scratch[worker], raw);
-    if (st == E_RANGE)
-        *raw = unmeasured(&job->objects[i]);
-    else if (st)
-        return st;
-    if (raw != m)
-        *m = *raw;
+    const struct moments_object o = object_of(s->input, s->opt, i);
+    int st = moments_measure(s->map, &o, &s->opt->moments, &s->scratch[worker], m);
+    if (st == E_RANGE) {
+        *m = unmeasured(&o);
+        st = OK;
+    }
+    return st;
+}
+
+static void correct_row(const struct shapecat *s, size_t i, const struct moments *m)
+{
+    struct rrg_psf psf = {.w = m->w};
+    struct rrg r;
+    double v[FIELDS], stars[2];
+    if (s->psf)
+        starmom_at(s->psf, m->w, &psf);
+    correct(s, m, &psf, &r, stars);
+    fill_row(m, &r, sqrt(0.5 * (psf.m2[0] + psf.m2[2])), stars, v);
+    for (int k = 0; k < FIELDS; k++)
+        s->t->col[s->column[k]].v.r[i] = v[k];
+    s->t->col[s->flags].v.i[i] = r.flags;
+}
+
+static int shape_rows(void *ctx, long begin, long end, int worker)
+{
+    const struct shapecat *s = ctx;
+    for (size_t i = (size_t)begin; i < (size_t)end; i++) {
+        struct moments m;
+        int st = measure_row(s, i, worker, &m);
+        if (st)
+            return st;
+        correct_row(s, i, &m);
+        if (s->kept)
+            s->kept[i] = m;
+    }
     return OK;
 }
 
-static int measure_rows(void *ctx, long begin, long end, int worker)
+static int correct_rows(void *ctx, long begin, long end, int worker)
 {
-    struct job *job = ctx;
-    for (long i = begin; i < end; i++) {
-        const struct moments_object *o = &job->objects[i];
-        struct moments m;
-        struct rrg_psf psf = {.w = o->w};
-        struct rrg r;
-        double v[FIELDS];
-        int st = row_moments(job, i, worker, &m);
-        if (st)
-            return st;
-        if (job->psf)
-            starmom_at(job->psf, o->w, &psf);
-        double dpsf = sqrt(0.5 * (psf.m2[0] + psf.m2[2])), stars[2];
-        correct(job, &m, &psf, &r, stars);
-        fill_row(&m, &r, dpsf, stars, v);
-        for (int k = 0; k < FIELDS; k++)
-            job->out[k][i] = v[k];
-        job->flags[i] = r.flags;
-    }
-    if (job->bar)
-        progress_tick(job->bar, end - begin);
+    const struct shapecat *s = ctx;
+    (void)worker;
+    for (size_t i = (size_t)begin; i < (size_t)end; i++)
+        correct_row(s, i, &s->kept[i]);
     return OK;
 }
 
 /* The column to write to: a new one, or the one of an earlier measurement. */
-static int column_for(struct table *t, const char *name, enum col_type type, const char *unit, const char *what)
+static int column_for(struct table *t, const char *name, enum col_type type, const char *unit, const char *what, size_t *index)
 {
     const struct column *c = table_find(t, name);
-    if (!c)
+    if (!c) {
+        *index = t->ncol;
         return table_add(t, name, type, unit, what);
+    }
+    *index = (size_t)(c - t->col);
     int same = type == COL_INT ? c->type == COL_INT : c->type == COL_REAL || c->type == COL_REAL32;
     return same ? OK : E_DATA;
 }
 
-double shapecat_bytes(size_t rows)
+static int add_columns(struct shapecat *s)
 {
-    return 8.0 * (FIELDS + 1) * (double)rows;
-}
-
-static int fill_columns(struct table *t, const struct moments_map *map, const struct moments_object *objects,
-                        const struct starmom *psf, const struct shapecat_options *opt, struct progress *bar, long *bad)
-{
-    struct job job = {.map = map, .objects = objects, .psf = psf, .opt = opt, .bar = bar};
     int st = OK;
     for (int k = 0; k < FIELDS && st == OK; k++)
-        st = column_for(t, fields[k].name, COL_REAL, fields[k].unit, fields[k].what);
-    if (st == OK)
-        st = column_for(t, "FLAGS_RRG", COL_INT, "", "what went wrong, see rrgshape(1)");
+        st = column_for(s->t, fields[k].name, COL_REAL, fields[k].unit, fields[k].what, &s->column[k]);
+    return st ? st : column_for(s->t, "FLAGS_RRG", COL_INT, "", "what went wrong, see rrgshape(1)", &s->flags);
+}
+
+int shapecat_open(struct shapecat **out, struct table *t, const struct moments_map *map, const struct starmom *psf,
+                  const struct shapecat_options *opt, struct err *e)
+{
+    const struct column *c[INPUTS];
+    int st = find_inputs(t, c, e);
     if (st)
         return st;
-    for (int k = 0; k < FIELDS; k++)
-        job.out[k] = table_reals(t, fields[k].name);
-    job.flags = table_ints(t, "FLAGS_RRG");
-    if (opt->rrg.first && psf) {
-        starmom_at(psf, opt->first_width, &job.first);
-        starmom_cov(psf, opt->first_width, job.first_cov);
+    struct shapecat *s = calloc(1, sizeof *s);
+    if (!s || !(s->scratch = calloc((size_t)opt->threads, sizeof *s->scratch))) {
+        free(s);
+        return err_set(e, E_NOMEM, "%s", err_text(E_NOMEM));
     }
-    job.scratch = calloc((size_t)opt->threads, sizeof *job.scratch);
-    if (!job.scratch)
-        return E_NOMEM;
-    st = par_for((long)t->nrow, 64, opt->threads, measure_rows, &job);
-    for (int k = 0; k < opt->threads; k++)
-        moments_scratch_free(&job.scratch[k]);
-    free(job.scratch);
+    s->t = t;
+    s->map = map;
+    s->psf = psf;
+    s->opt = opt;
+    if ((st = add_columns(s))) {
+        shapecat_close(s);
+        return err_set(e, st, "%s", st == E_DATA ? "a column with the name of a shape column is of another type"
+                                  : st == E_RANGE ? "no column fits behind COEFFS, whose rows have any length" : err_text(st));
+    }
+    if (psf) {
+        starmom_at(psf, opt->first_width, &s->first);
+        starmom_cov(psf, opt->first_width, s->first_cov);
+    }
+    *out = s;
+    return OK;
+}
+
+void shapecat_close(struct shapecat *s)
+{
+    if (!s)
+        return;
+    par_team_free(s->team);
+    for (int k = 0; k < s->opt->threads; k++)
+        moments_scratch_free(&s->scratch[k]);
+    free(s->scratch);
+    free(s->kept);
+    free(s);
+}
+
+int shapecat_measure(struct shapecat *s, long *bad)
+{
+    struct err e;
+    int st = find_inputs(s->t, s->input, &e);
+    if (st)
+        return st;
+    if (s->opt->keep && s->t->nrow > s->cap) {
+        struct moments *kept = realloc(s->kept, s->t->nrow * sizeof *kept);
+        if (!kept)
+            return E_NOMEM;
+        s->kept = kept;
+        s->cap = s->t->nrow;
+    }
+    if (!s->team && s->t->nrow > CHUNK)
+        s->team = par_team_new(s->opt->threads);
+    s->rrg = &s->opt->rrg;
+    st = par_team_for(s->team, (long)s->t->nrow, CHUNK, shape_rows, s);
     *bad = 0;
-    for (size_t i = 0; i < t->nrow && st == OK; i++)
-        *bad += job.flags[i] != 0;
+    for (size_t i = 0; i < s->t->nrow && st == OK; i++)
+        *bad += s->t->col[s->flags].v.i[i] != 0;
     return st;
 }
 
-int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
-                     const struct starmom *psf, const struct shapecat_options *opt, struct progress *bar, long *bad)
+int shapecat_correct(struct shapecat *s, const struct rrg_options *rrg)
 {
-    return fill_columns(t, map, objects, psf, opt, bar, bad);
+    s->rrg = rrg;
+    return s->t->nrow > s->cap ? E_RANGE : par_team_for(s->team, (long)s->t->nrow, CHUNK, correct_rows, s);
 }
 
-int shapecat_correct(struct table *t, const struct moments_object *objects, const struct starmom *psf,
-                     const struct shapecat_options *opt)
+void shapecat_region(const struct shapecat *s, struct region *r)
 {
-    long bad;
-    return opt->raw ? fill_columns(t, NULL, objects, psf, opt, NULL, &bad) : E_RANGE;
+    const struct table *t = s->t;
+    const double *x = table_reals(t, "X_RRG"), *y = table_reals(t, "Y_RRG"), *w = table_reals(t, "WIDTH");
+    const double *xx = table_reals(t, "JXX_RAW"), *xy = table_reals(t, "JXY_RAW"), *yy = table_reals(t, "JYY_RAW");
+    const int64_t *flags = table_ints(t, "FLAGS_RRG");
+    const struct column *number = table_find(t, "NUMBER");
+    for (size_t i = 0; i < t->nrow; i++) {
+        const double mean = 0.5 * (xx[i] + yy[i]), half = 0.5 * hypot(xx[i] - yy[i], 2 * xy[i]);
+        const int good = mean - half > 0;
+        if (isfinite(x[i]) && isfinite(y[i]))
+            region_ellipse(r, x[i], y[i], good ? 2 * sqrt(mean + half) : w[i], good ? 2 * sqrt(mean - half) : w[i],
+                           good ? 90 / M_PI * atan2(2 * xy[i], xx[i] - yy[i]) : 0, (size_t)table_number(number, i),
+                           flags[i] ? "red" : NULL);
+    }
 }
 
 /* Column names: PXXERR, and PXX_PXY for the covariance of two moments. */

@@ -7,7 +7,7 @@
 
 #include "err.h"
 #include "moments.h"
-#include "progress.h"
+#include "region.h"
 #include "rrg.h"
 #include "starmom.h"
 #include "table.h"
@@ -21,20 +21,13 @@ struct shapecat_options {
     double first_width;       /* with rrg.first: width of the PSF's weight, px */
     struct moments_options moments;
     struct rrg_options rrg;
-    struct moments *raw;      /* NULL, or room for the moments of every row: kept for shapecat_correct() */
+    int keep;                 /* the moments are kept for shapecat_correct() */
     int threads;
 };
 
 /*
- * Start positions, widths, sky of every row from NUMBER X_IMAGE Y_IMAGE A_IMAGE
- * B_IMAGE [BACKGROUND] [BACKRMS]; allocated.  A_IMAGE, B_IMAGE that are not > 0
- * give the smallest width.  E_MISSING: e names the column.
- */
-MUST_CHECK int shapecat_objects(const struct table *t, const struct shapecat_options *opt,
-                                struct moments_object **objects, struct err *e);
-
-/*
- * The rows that may serve as stars, as shapecat_objects() gives them: FLAGS (when
+ * The rows of NUMBER X_IMAGE Y_IMAGE A_IMAGE B_IMAGE [BACKGROUND] [BACKRMS] that may serve as stars; allocated.
+ * A_IMAGE, B_IMAGE that are not > 0 give the smallest width.  E_MISSING: e names the column.  Used are those with FLAGS (when
  * there is such a column) below 4, and no brighter object (FLUX_AUTO) within
  * `radius` pixels, so that pieces of a bright star's wings go and the star stays.
  * Blended stars are kept: whether a star is split depends on its place in the
@@ -44,19 +37,20 @@ MUST_CHECK int shapecat_stars(const struct table *t, const struct shapecat_optio
                               struct moments_object **stars, size_t *n, struct err *e);
 
 /*
- * Measure and correct every row and add (or replace) the shape columns.
- * psf NULL: no correction, P = 0.  bad: rows with FLAGS_RRG != 0.
+ * Shapes of a catalogue that comes in blocks.  shapecat_open() adds the shape columns to t, or takes those that are there;
+ * shapecat_measure() fills them for the rows that t has now, shapecat_correct() with another correction of the
+ * same moments (opt->keep).
+ * t, map, psf (NULL: no correction, P = 0) and opt must stay; t keeps its columns.  bad: rows with FLAGS_RRG != 0.
+ * E_MISSING: a column of the input; E_DATA: a shape column is of another type.
  */
-MUST_CHECK int shapecat_measure(struct table *t, const struct moments_map *map, const struct moments_object *objects,
-                                const struct starmom *psf, const struct shapecat_options *opt,
-                                struct progress *bar, long *bad);
-
-/* The shape columns of another correction, from the moments that shapecat_measure() kept in opt->raw. */
-MUST_CHECK int shapecat_correct(struct table *t, const struct moments_object *objects, const struct starmom *psf,
-                                const struct shapecat_options *opt);
-
-/* Bytes that the shape columns of so many rows take. */
-double shapecat_bytes(size_t rows);
+struct shapecat;
+MUST_CHECK int shapecat_open(struct shapecat **s, struct table *t, const struct moments_map *map, const struct starmom *psf,
+                             const struct shapecat_options *opt, struct err *e);
+MUST_CHECK int shapecat_measure(struct shapecat *s, long *bad);
+MUST_CHECK int shapecat_correct(struct shapecat *s, const struct rrg_options *rrg);
+/* Second moments as observed, as ellipses of twice their rms; red with a flag, the weight where there are none. */
+void shapecat_region(const struct shapecat *s, struct region *r);
+void shapecat_close(struct shapecat *s);
 
 /*
  * Star moments as a table: WIDTH [pixel] NSTARS PXX .. PYYYY, errors and covariances

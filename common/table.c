@@ -369,16 +369,22 @@ int table_add(struct table *t, const char *name, enum col_type type, const char 
     return OK;
 }
 
+int table_reserve(struct table *t, size_t cap)
+{
+    if (cap <= t->cap)
+        return OK;
+    for (size_t i = 0; i < t->ncol; i++)
+        if (column_reserve(&t->col[i], cap))
+            return E_NOMEM;
+    t->cap = cap;
+    return OK;
+}
+
 int table_resize(struct table *t, size_t nrow)
 {
-    if (nrow > t->cap) {
-        size_t cap = t->cap + t->cap / 2;
-        cap = cap > nrow ? cap : nrow;
-        for (size_t i = 0; i < t->ncol; i++)
-            if (column_reserve(&t->col[i], cap))
-                return E_NOMEM;
-        t->cap = cap;
-    }
+    const size_t more = t->cap + t->cap / 2;
+    if (nrow > t->cap && table_reserve(t, more > nrow ? more : nrow))
+        return E_NOMEM;
     for (size_t i = 0; i < t->ncol && nrow > t->nrow; i++)
         if (column_clear(&t->col[i], t->nrow, nrow)) {
             while (i-- > 0)

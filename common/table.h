@@ -59,6 +59,9 @@ int table_good_name(const char *name);
 MUST_CHECK int table_add(struct table *t, const char *name, enum col_type type, const char *unit,
                          const char *what);
 
+/* Room for cap rows, so that table_resize() has only to clear cells. */
+MUST_CHECK int table_reserve(struct table *t, size_t cap);
+
 /* Make nrow rows; new cells are 0, NaN for reals, "" for words. Not for ragged columns' contents. */
 MUST_CHECK int table_resize(struct table *t, size_t nrow);
 

@@ -15,9 +15,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-enum { LINE_MAX_BYTES = 65536, CELLS_MAX = 4096, BLOCK = 1 << 18 };
+enum { LINE_MAX_BYTES = 65536, CELLS_MAX = 4096, BLOCK = 1 << 18, STEP = 64 };
 enum { UNTYPED = -1 };
 
 /* ---- lines of a file ---- */
@@ -443,9 +444,9 @@ static int number_error(struct lines *s, const char *column, const char *p, size
          : cell_error(s, column, p, n, st == E_RANGE ? "is too large" : "is not a number");
 }
 
-static int count_error(struct lines *s, const struct table *t, size_t got)
+static int count_error(const struct rows *r, size_t got)
 {
-    return err_set(s->e, E_DATA, "%s: line %ld: %zu cells where the header names %zu columns", s->name, s->line, got, t->ncol);
+    return err_set(r->s->e, E_DATA, "%s: line %ld: %zu cells where the header names %zu columns", r->s->name, r->s->line, got, r->ncol);
 }
 
 static size_t count_cells(const char *p, const char *end)
@@ -473,10 +474,10 @@ static int parse_ragged(struct rows *r, struct column *c, size_t row, const char
         if (st)
             return number_error(r->s, c->name, p, n, st);
     }
-    if (count + r->t->ncol - 1 > CELLS_MAX)
+    if (count + r->ncol - 1 > CELLS_MAX)
         return err_set(r->s->e, E_DATA, "%s: line %ld: more than %d cells", r->s->name, r->s->line, CELLS_MAX);
     if (count == 0)
-        return count_error(r->s, r->t, r->t->ncol - 1);
+        return count_error(r, r->ncol - 1);
     if (table_ragged(r->t, c, row, r->ragged, count))
         return no_memory(r->s);
     r->s->held += 8.0 * (double)count;
@@ -505,24 +506,33 @@ static int scan_real(const char *p, size_t n, enum col_type type, double *v)
     return st;
 }
 
-static int parse_row(struct rows *r, const char *p, const char *end)
+/* Make row `row`, and some more behind it: clearing many cells of a column at once is cheaper.  Of n rows, SIZE_MAX: of all. */
+static int make_rows(struct rows *r, size_t row, size_t n)
 {
     struct table *t = r->t;
-    size_t row = t->nrow, n, i;
-    const char *line = p;
-    if (row == t->cap) {
-        double more = (double)(t->cap + t->cap / 2) * (double)(t->ncol + 1) * 8;
-        if (more + r->s->held + (double)r->s->cap > r->s->max_memory)
+    const size_t want = n - row > STEP ? row + STEP : n;
+    if (want > t->cap) {
+        const size_t more = t->cap + t->cap / 2, cap = n < SIZE_MAX ? n : more > want ? more : want;
+        if ((double)cap * (double)(t->ncol + 1) * 8 + r->s->held + (double)r->s->cap > r->s->max_memory)
             return err_set(r->s->e, E_NOMEM, "%s: line %ld: needs more than --max-memory", r->s->name, r->s->line);
+        if (table_reserve(t, cap))
+            return no_memory(r->s);
     }
-    if (table_resize(t, row + 1))
-        return no_memory(r->s);
+    return table_resize(t, want) ? no_memory(r->s) : OK;
+}
+
+/* The cells of a line as row `row` of the table. */
+static int parse_row(struct rows *r, size_t row, const char *p, const char *end)
+{
+    struct table *t = r->t;
+    size_t n, i;
+    const char *line = p;
     for (i = 0; i < r->ncol; i++, p += n) {
         struct column *c = &t->col[i];
         if (c->type == COL_RAGGED)
             return parse_ragged(r, c, row, p, end);
         if (!(n = next_word(&p, end)))
-            return count_error(r->s, t, i);
+            return count_error(r, i);
         int st = OK;
         if (c->type == COL_TEXT)
             st = parse_word(r, c, row, p, n);
@@ -534,18 +544,18 @@ static int parse_row(struct rows *r, const char *p, const char *end)
             return c->type == COL_TEXT ? st : number_error(r->s, c->name, p, n, st);
     }
     if (next_word(&p, end))
-        return count_error(r->s, t, count_cells(line, end));
+        return count_error(r, count_cells(line, end));
     return OK;
 }
 
-/* A comment among the rows: only a second, different header is an error. */
-static int check_comment(struct lines *s, const struct table *t, const char *p, const char *end)
+/* A comment among the rows of ncol cells: only a second, different header is an error. */
+static int check_comment(struct lines *s, const struct table *t, size_t ncol, const char *p, const char *end)
 {
     size_t n = next_word(&p, end), i = 0;
     int other = 0;
     if (starts(p, end, "Column ") || starts(p, end, "Keyword: ") || starts(p, end, "HISTORY "))
         return OK;
-    for (; n && i < t->ncol; i++) {
+    for (; n && i < ncol; i++) {
         char name[256];
         if (n >= sizeof name)
             return OK;
@@ -557,7 +567,7 @@ static int check_comment(struct lines *s, const struct table *t, const char *p, 
         p += n;
         n = next_word(&p, end);
     }
-    if (n == 0 && i == t->ncol && other)
+    if (n == 0 && i == ncol && other)
         return err_set(s->e, E_DATA, "%s: line %ld: a second header with other columns", s->name, s->line);
     return OK;
 }
@@ -574,7 +584,7 @@ static int each_row(struct lines *s, const struct table *t, char *line, size_t l
     while (line && !st) {
         const char *p = line, *end = line + len;
         if (next_word(&p, end))
-            st = *p == '#' ? check_comment(s, t, p + 1, end) : what(ctx, p, end);
+            st = *p == '#' ? check_comment(s, t, t->ncol, p + 1, end) : what(ctx, p, end);
         if (!st)
             st = lines_next(s, &line, &len);
     }
@@ -743,19 +753,22 @@ static int open_text(struct table_in *in, struct table *t)
     return st;
 }
 
-/* Up to n more rows of a text behind those of t. */
+/* The next n rows of a text at most; t has none. */
 static int text_rows(struct table_in *in, struct table *t, size_t n)
 {
+    size_t row = 0;
     int st = OK;
     in->r.t = t;
-    while (in->line && !st && t->nrow < n) {
+    while (in->line && !st && row < n) {
         const char *p = in->line, *end = in->line + in->len;
-        if (next_word(&p, end))
-            st = *p == '#' ? check_comment(&in->s, t, p + 1, end) : parse_row(&in->r, p, end);
+        if (next_word(&p, end) && *p == '#')
+            st = check_comment(&in->s, t, in->r.ncol, p + 1, end);
+        else if (p < end && (row < t->nrow || !(st = make_rows(&in->r, row, n))) && !(st = parse_row(&in->r, row, p, end)))
+            row++;
         if (!st)
             st = lines_next(&in->s, &in->line, &in->len);
     }
-    return st;
+    return !st && table_resize(t, row) ? no_memory(&in->s) : st;
 }
 
 /* Is there no file of this literal name, but "[...]" at its end? */
@@ -839,6 +852,18 @@ int table_in_rows(struct table_in *in, struct table *t, size_t n, struct err *e)
     if (table_resize(t, 0))
         return no_memory(&in->s);
     return text_rows(in, t, n);
+}
+
+double table_in_part(const struct table_in *in)
+{
+    const struct lines *s = &in->s;
+    struct stat sb;
+    if (in->rows)
+        return fits_table_part(in->rows);
+    const off_t read = s->gzip ? -1 : lseek(s->fd, 0, SEEK_CUR);
+    if (read < 0 || fstat(s->fd, &sb) || sb.st_size < 1)
+        return 0;
+    return (double)(read - (off_t)(s->end - s->begin)) / (double)sb.st_size;
 }
 
 void table_in_close(struct table_in *in)

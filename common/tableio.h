@@ -38,6 +38,18 @@ MUST_CHECK int table_write_rows(const struct table *t, struct table_rows *rows, 
                                 const char *const *inputs, size_t n_inputs, struct err *e);
 
 /*
+ * Writing in blocks.  table_out_begin() may be left out; it gives the header when that is complete before the rows, which
+ * then go out as they come where the format allows (text without words, whose longest a header tells).  Else they wait
+ * as tablerows.h says.  Every block has the columns of `head`; table_out_end() makes the file appear and frees *o whatever
+ * happens.  Names, `head` and its columns must stay until then.
+ */
+struct table_out;
+MUST_CHECK int table_out_open(struct table_out **o, const char *name, const char *const *inputs, size_t n_inputs, struct err *e);
+MUST_CHECK int table_out_begin(struct table_out *o, const struct table *head, const char *record, struct err *e);
+MUST_CHECK int table_out_rows(struct table_out *o, const struct table *t, struct err *e);
+MUST_CHECK int table_out_end(struct table_out *o, const struct table *head, const char *record, struct err *e);
+
+/*
  * Reading in blocks: t gets the header (columns without rows, keywords,
  * HISTORY), table_in_rows() replaces its rows by the next n at most, none at the
  * end.  Columns that are added to t behind those of the file are left as
@@ -48,6 +60,9 @@ struct table_in;
 MUST_CHECK int table_in_open(struct table_in **in, struct table *t, const char *name, double max_memory, struct err *e);
 MUST_CHECK int table_in_rows(struct table_in *in, struct table *t, size_t n, struct err *e);
 void table_in_close(struct table_in *in);
+
+/* Part of the rows that has been read; 0: not known (a pipe). */
+double table_in_part(const struct table_in *in);
 
 /* A number of rows that takes about a megabyte. */
 size_t table_block_rows(const struct table *t);

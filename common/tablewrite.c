@@ -12,15 +12,15 @@ struct sink {
     struct outfile *o;
     char *buf;
     size_t n;
-    int st;                  /* first failure */
+    int st, why;             /* first failure and its errno */
 };
 
 enum { SINK = 1 << 16 };
 
 static void sink_flush(struct sink *k)
 {
-    if (!k->st)
-        k->st = outfile_write(k->o, k->buf, k->n);
+    if (!k->st && (k->st = outfile_write(k->o, k->buf, k->n)))
+        k->why = errno;
     k->n = 0;
 }
 
@@ -102,7 +102,8 @@ static void put_type(struct sink *k, const struct column *c, size_t longest)
     put_text(k, s);
 }
 
-static void put_header(struct sink *k, const struct table *t, const struct table_rows *rows, const char *record)
+/* `longest`: of every column, looked at for words only. */
+static void put_header(struct sink *k, const struct table *t, const size_t *longest, const char *record)
 {
     char s[64];
     size_t width = 8;
@@ -130,7 +131,7 @@ static void put_header(struct sink *k, const struct table *t, const struct table
         put_text(k, "[");
         put_plain(k, c->unit, 1);
         put_text(k, ",");
-        put_type(k, c, rows->longest[i]);
+        put_type(k, c, c->type == COL_TEXT ? longest[i] : 0);
         put_text(k, "] ");
         put_plain(k, c->what[0] ? c->what : "no description", 0);
         put_text(k, "\n");
@@ -187,39 +188,72 @@ static int put_row(struct sink *k, const struct table *t, size_t row, size_t bef
     return OK;
 }
 
+/* The rows of one block; st of the sink tells what became of the bytes. */
+static int put_block(struct sink *k, const struct table *t, size_t before, const char *name, struct err *e)
+{
+    int st = OK;
+    for (size_t i = 0; i < t->nrow && !st && !k->st; i++)
+        st = put_row(k, t, i, before, name, e);
+    return st;
+}
+
 static int put_rows(struct sink *k, struct table_rows *rows, const char *name, struct err *e)
 {
     const struct table *t;
     size_t before = 0;
     int st;
-    for (rows->again(rows); !(st = rows->next(rows, &t, e)) && t; before += t->nrow)
-        for (size_t i = 0; i < t->nrow; i++)
-            if ((st = put_row(k, t, i, before, name, e)) || k->st)
-                return st;
+    for (rows->again(rows); !(st = rows->next(rows, &t, e)) && t && !k->st; before += t->nrow)
+        if ((st = put_block(k, t, before, name, e)))
+            break;
+    return st;
+}
+
+static const char *shown(const char *name)
+{
+    return strcmp(name, "-") == 0 ? "standard output" : name;
+}
+
+static int sink_open(struct sink *k, const char *name, const char *const *inputs, size_t n_inputs, struct err *e)
+{
+    *k = (struct sink){.buf = malloc(SINK)};
+    if (!k->buf)
+        return err_set(e, E_NOMEM, "%s: %s", shown(name), err_text(E_NOMEM));
+    int st = outfile_open(&k->o, name, inputs, n_inputs, e);
+    if (st)
+        free(k->buf);
+    return st;
+}
+
+/* A failure to write, in words. */
+static int sink_error(const struct sink *k, const char *name, struct err *e)
+{
+    return k->st ? err_set(e, k->st, "%s: %s", shown(name), k->st == E_IO ? strerror(k->why) : err_text(k->st)) : OK;
+}
+
+/* Make the file appear, unless something failed before (st). */
+static int sink_end(struct sink *k, const char *name, int st, struct err *e)
+{
+    if (!st) {
+        sink_flush(k);
+        st = sink_error(k, name, e);
+    }
+    if (st)
+        outfile_abandon(k->o);
+    else
+        st = outfile_commit(k->o, e);
+    free(k->buf);
     return st;
 }
 
 static int write_text(const struct table *t, struct table_rows *rows, const char *name, const char *record,
                       const char *const *inputs, size_t n_inputs, struct err *e)
 {
-    const char *shown = strcmp(name, "-") == 0 ? "standard output" : name;
-    struct sink k = {.buf = malloc(SINK)};
-    if (!k.buf)
-        return err_set(e, E_NOMEM, "%s: %s", shown, err_text(E_NOMEM));
-    int st = outfile_open(&k.o, name, inputs, n_inputs, e);
-    if (!st) {
-        put_header(&k, t, rows, record);
-        st = put_rows(&k, rows, shown, e);
-        sink_flush(&k);
-        if (!st && k.st)
-            st = err_set(e, k.st, "%s: %s", shown, k.st == E_IO ? strerror(errno) : err_text(k.st));
-        if (st)
-            outfile_abandon(k.o);
-        else
-            st = outfile_commit(k.o, e);
-    }
-    free(k.buf);
-    return st;
+    struct sink k;
+    int st = sink_open(&k, name, inputs, n_inputs, e);
+    if (st)
+        return st;
+    put_header(&k, t, rows->longest, record);
+    return sink_end(&k, name, put_rows(&k, rows, shown(name), e), e);
 }
 
 static int write_fits(const struct table *t, struct table_rows *rows, const char *name, const char *record,
@@ -269,5 +303,71 @@ int table_write(const struct table *t, const char *name, const char *record, con
         return err_set(e, E_NOMEM, "%s: %s", name, err_text(E_NOMEM));
     int st = table_write_rows(t, &whole.rows, name, record, inputs, n_inputs, e);
     table_whole_free(&whole);
+    return st;
+}
+
+/* ---- in blocks ---- */
+
+struct table_out {
+    const char *name, *const *inputs;
+    size_t n_inputs;
+    struct row_spool *spool;  /* where rows wait; NULL: they go to `k` */
+    struct sink k;
+    size_t before;            /* rows that went out */
+};
+
+int table_out_open(struct table_out **out, const char *name, const char *const *inputs, size_t n_inputs, struct err *e)
+{
+    struct table_out *o = calloc(1, sizeof *o);
+    if (!o || row_spool_open(&o->spool)) {
+        free(o);
+        return err_set(e, E_NOMEM, "%s: %s", shown(name), err_text(E_NOMEM));
+    }
+    o->name = name;
+    o->inputs = inputs;
+    o->n_inputs = n_inputs;
+    *out = o;
+    return OK;
+}
+
+int table_out_begin(struct table_out *o, const struct table *head, const char *record, struct err *e)
+{
+    int waits = outname_is_fits(o->name);
+    for (size_t i = 0; i < head->ncol; i++)
+        waits |= head->col[i].type == COL_TEXT;
+    if (waits)
+        return OK;
+    int st = sink_open(&o->k, o->name, o->inputs, o->n_inputs, e);
+    if (st)
+        return st;
+    row_spool_close(o->spool);
+    o->spool = NULL;
+    put_header(&o->k, head, NULL, record);
+    return OK;
+}
+
+int table_out_rows(struct table_out *o, const struct table *t, struct err *e)
+{
+    int st = o->spool ? row_spool_add(o->spool, t) : put_block(&o->k, t, o->before, shown(o->name), e);
+    if (o->spool)
+        return st ? err_set(e, st, "%s: cannot spool: %s", shown(o->name), st == E_IO ? strerror(errno) : err_text(st)) : OK;
+    o->before += t->nrow;
+    return st ? st : sink_error(&o->k, o->name, e);
+}
+
+/* The rows that waited. */
+static int write_spool(struct table_out *o, const struct table *head, const char *record, struct err *e)
+{
+    struct table_rows *rows;
+    if (row_spool_rows(o->spool, head, &rows))
+        return err_set(e, E_NOMEM, "%s: %s", shown(o->name), err_text(E_NOMEM));
+    return table_write_rows(head, rows, o->name, record, o->inputs, o->n_inputs, e);
+}
+
+int table_out_end(struct table_out *o, const struct table *head, const char *record, struct err *e)
+{
+    int st = o->spool ? write_spool(o, head, record, e) : sink_end(&o->k, o->name, OK, e);
+    row_spool_close(o->spool);
+    free(o);
     return st;
 }

@@ -119,8 +119,8 @@ fails "--plain is --region" 2 rrgshape im.fits im.cat --psf none --plain reg --r
 fails "--plain is an input" 1 rrgshape im.fits im.cat --psf none --plain im.cat -o reg.out
 fails "--plain with --stars-only" 2 rrgshape im.fits im.cat --stars-only --plain a.out -o reg.out
 awk 'BEGIN { for (i = 1; i <= 5000; i++) print i, 20, 30, 2.5, 2.5 }' | rows >many.cat
-ok "memory for one catalogue: 2.1 MB" rrgshape im.fits many.cat --psf none --max-memory 3M -o reg.out
-fails "and not for two" 1 rrgshape im.fits many.cat --psf none --plain plain.out --max-memory 3M -o reg.out
+ok "3 MB are enough for any number of objects" rrgshape im.fits many.cat --psf none --plain plain.out --max-memory 3M -o reg.out
+fails "1.5 MB are not" 1 rrgshape im.fits many.cat --psf none --max-memory 1500K -o reg.out
 rrgshape - im.cat --psf none <im.fits >pipe.out
 near "image from a pipe" "$(paste <(col im.out JXX_RAW) <(col pipe.out JXX_RAW) | awk '$1 != $2' | wc -l)" 0 0
 rrgshape im.fits im.out --psf none -o again.out
@@ -152,6 +152,8 @@ near "NOISECOR 2.4: error of the flux 2.4 times as large" "$(paste <(col cor.out
 near "NOISECOR: error of Jxx likewise" "$(paste <(col cor.out JXXERR_RAW) <(col now.out JXXERR_RAW) | awk '{ print $1 / $2 }')" 2.4 1e-9
 near "NOISECOR: the moments stay" "$(col cor.out JXX_RAW)" "$(col now.out JXX_RAW)" 0
 fails "image and catalogue from one pipe" 2 rrgshape - - --psf none
+fails "catalogue and star moments from one pipe" 2 rrgshape im.fits - --stars -
+fails "catalogue and stars from one pipe" 2 rrgshape im.fits - --stars im.fits,-
 rrgshape --stars-only im.fits im.cat --check 2>plan.txt; near "--check of stars: one line" "$(wc -l <plan.txt)" 1 0
 fails "neither stars nor PSF" 2 rrgshape im.fits im.cat
 fails "both stars and PSF" 2 rrgshape im.fits im.cat --psf none --stars x
