@@ -171,6 +171,9 @@ static int sort_shots(struct stack *s, struct err *e)
     for (size_t i = 0; i < s->n && tie && st == OK; i++)
         st = hash_shot(&s->shot[i], e);
     qsort(s->shot, s->n, sizeof *s->shot, by_key);
+    for (size_t i = 1; i < s->n && tie && st == OK; i++)
+        if (by_key(&s->shot[i], &s->shot[i - 1]) == 0)
+            st = err_set(e, E_DATA, "%s: the same exposure as %s, header and pixels: leave one out", s->shot[i].label, s->shot[i - 1].label);
     return st;
 }
 

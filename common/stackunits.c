@@ -34,6 +34,21 @@ static double zero_point(const struct exposure *x)
     return x->unit == UNIT_RATE ? x->magzero : x->magzero - 2.5 * log10(x->exptime);
 }
 
+static int sky_is_off(const struct shot *t)
+{
+    int off;
+    return header_bool(&t->x.hdr, "SKYSUB", &off) == OK && off;
+}
+
+/* 1 when every exposure tells its zero point; that of some is not that of the sum. */
+static int all_have_zero_points(const struct stack *s)
+{
+    int all = 1;
+    for (size_t i = 0; i < s->n; i++)
+        all &= isfinite(s->shot[i].x.magzero) != 0;
+    return all;
+}
+
 /* Exposures that are added must be in the same photometric system. */
 static int check_alike(const struct stack *s, struct err *e)
 {
@@ -42,6 +57,8 @@ static int check_alike(const struct stack *s, struct err *e)
         const struct shot *b = &s->shot[i];
         if (b->x.unit != a->x.unit)
             return err_set(e, E_DATA, "%s: BUNIT differs from that of %s", b->label, a->label);
+        if (sky_is_off(b) != sky_is_off(a))
+            return err_set(e, E_DATA, "%s: SKYSUB differs from that of %s: subtract the sky of both, or of none", b->label, a->label);
         if (fabs(zero_point(&b->x) - zero_point(&a->x)) > 1e-4)
             return err_set(e, E_DATA, "%s: MAGZERO less 2.5 log10(EXPTIME) is %.4f, that of %s %.4f: scale one of them",
                            b->label, zero_point(&b->x), a->label, zero_point(&a->x));
@@ -135,12 +152,14 @@ static int set_system(const struct stack *s, struct header *h)
         snprintf(per_second, sizeof per_second, "%s/s", unit);
         set(&st, header_set_str(h, "BUNIT", per_second, NULL));
     }
+    if (!all_have_zero_points(s))
+        header_remove(h, "MAGZERO");
     if (isnan(s->total))
         return st;
     set(&st, header_set_double(h, "EXPTIME", rate_out ? s->total : time, "exposure time, s"));
     set(&st, header_set_double(h, "TOTTIME", s->total, "time of all exposures together, s"));
     set(&st, header_set_double(h, "GAIN", header_double_or(h, "GAIN", 1) * (s->total / time), "electron per BUNIT"));
-    if (!isnan(x->magzero))
+    if (all_have_zero_points(s))
         set(&st, header_set_double(h, "MAGZERO", zero_point(x) + 2.5 * log10(time), "AB magnitude of 1 BUNIT"));
     return st;
 }

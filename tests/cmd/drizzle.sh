@@ -405,3 +405,15 @@ dither -n 2 stars.fits | addnoise --depth 26.5 | drizzle -x 0.1 --pixfrac 1 --fl
 detect -q --threshold 5 stack.fits -o stack.cat
 near "stack of pixfrac 1: NOISECOR" "$($F card stack.fits 0 NOISECOR)" 2.4 1e-9
 between "stack of pixfrac 1: spread of the fluxes of 400 stars over their FLUXERR_AUTO" "$(paste -d' ' <(col stack.cat FLUX_AUTO) <(col stack.cat FLUXERR_AUTO) | sort -g | awk '{ f[NR] = $1; e += $2 } END { lo = int(NR * 0.16) + 1; hi = int(NR * 0.84); printf "%.3f", (f[hi] - f[lo]) / 2 / (e / NR) }')" 0.85 1.3
+
+# ---- exposures that do not belong together ----
+mapfile -t Wp < <(printf '%s\n' "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRVAL1  = 150.0" "CRVAL2  = 2.2" "CRPIX1  = 8.0" "CRPIX2  = 8.0" "CD1_1   = -2.0E-5" "CD1_2   = 0.0" "CD2_1   = 0.0" "CD2_2   = 2.0E-5")
+pair() { $F make "$1" 15 15 "$2" "EXPTIME = 100.0" "BUNIT   = 'electron'" "${Wp[@]}" "${@:3}"; }
+pair p1.fits 10 "MAGZERO = 30.0"; pair p2.fits 11 "MAGZERO = 30.0"; pair p3.fits 12; pair p4.fits 13 "SKYSUB  =                    T" "MAGZERO = 30.0"
+cp p1.fits copy.fits; ln -s p1.fits link.fits
+ok "two exposures" drizzle p1.fits p2.fits -o p.fits
+near "their MAGZERO" "$($F card p.fits 1 MAGZERO)" 30.752575 1e-6
+for f in p1.fits copy.fits link.fits; do fails "an exposure twice, as $f" 1 drizzle p1.fits $f p2.fits -o twice.fits; done
+drizzle p1.fits p3.fits -o p.fits; near "MAGZERO of one of two is not that of their sum" "$($F card p.fits 1 MAGZERO | grep -c .)" 0 0
+drizzle p3.fits p1.fits -o p.fits; near "nor in the other order" "$($F card p.fits 1 MAGZERO | grep -c .)" 0 0
+fails "sky subtracted from one of two" 1 drizzle p1.fits p4.fits -o p.fits
