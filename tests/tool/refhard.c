@@ -2,7 +2,7 @@
  * refhard.c - naive against stable method for the parameters that are hard, and the
  * exactness of photon noise, against references that share no code with either.
  *
- *   refhard table               order of basis functions, pixel over beta, shear: "what value naive stable"
+ *   refhard table               order of basis functions, pixel and distance over beta, shear: "what value naive stable"
  *   refhard poisson             mean, share of draws that differ from the exact quantile: float sum, double sum, ours
  *   refhard flat N VALUE OUT    N x N image of one value
  *   refhard chi2 MEAN IMAGE     z-score of chi-square of the pixels against the Poisson distribution
@@ -89,35 +89,46 @@ static double pixel_naive(int n, double a, double h)
     return n % 2 ? odd : even;
 }
 
-static void pixels(void)
+/* Largest error over the integral of |phi_n|, n = 0, 4, 8, 12, of the naive and of our integral over [a, a+h]. */
+static void pixel_errors(double a, double h, double *bad, double *good)
 {
     static const long double x[8] = {-0.96028985649753623168L, -0.79666647741362673959L, -0.52553240991632898582L, -0.18343464249564980494L,
                                      0.18343464249564980494L, 0.52553240991632898582L, 0.79666647741362673959L, 0.96028985649753623168L};
     static const long double w[8] = {0.10122853629037625915L, 0.22238103445337447054L, 0.31370664587788728734L, 0.36268378337836198297L,
                                      0.36268378337836198297L, 0.31370664587788728734L, 0.22238103445337447054L, 0.10122853629037625915L};
-    const double list[] = {1e-4, 1e-3, 1e-2, 0.1, 0.5, 1, 2};
-    for (size_t k = 0; k < sizeof list / sizeof *list; k++) {
-        const double h = list[k];
-        const int parts = (int)ceil(h / 0.1);
-        double bad = 0, good = 0, b[13];
-        for (int i = 0; i <= 48; i++) {           /* relative, tails too */
-            const double edge[2] = {0.25 * i, 0.25 * i + h};
-            for (int n = 0; n <= 12; n += 4) {
-                long double s = 0, scale = 0;
-                for (int p = 0; p < parts; p++)
-                    for (int g = 0; g < 8; g++) {
-                        const long double width = (long double)(edge[1] - edge[0]) / parts;
-                        const long double f = hermite(n, edge[0] + (p + 0.5L + x[g] / 2) * width) * w[g] * width / 2;
-                        s += f;
-                        scale += fabsl(f);
-                    }
-                if (shapelet_pixel(12, 1, 1, edge, b))
-                    exit(1);
-                bad = fmax(bad, (double)(fabsl(pixel_naive(n, edge[0], h) - s) / scale));
-                good = fmax(good, (double)(fabsl(b[n] - s) / scale));
+    const int parts = (int)ceil(h / 0.1);
+    const double edge[2] = {a, a + h};
+    double b[13];
+    if (shapelet_pixel(12, 1, 1, edge, b))
+        exit(1);
+    for (int n = 0; n <= 12; n += 4) {
+        long double s = 0, scale = 0;
+        for (int p = 0; p < parts; p++)
+            for (int g = 0; g < 8; g++) {
+                const long double width = (long double)(edge[1] - edge[0]) / parts;
+                const long double f = hermite(n, edge[0] + (p + 0.5L + x[g] / 2) * width) * w[g] * width / 2;
+                s += f;
+                scale += fabsl(f);
             }
-        }
-        printf("pixel/beta %g %.1e %.1e\n", h, bad, good);
+        *bad = fmax(*bad, (double)(fabsl(pixel_naive(n, a, h) - s) / scale));
+        *good = fmax(*good, (double)(fabsl(b[n] - s) / scale));
+    }
+}
+
+/* Sizes of pixels within 4 beta of the centre; distances of pixels of 0.1 beta. */
+static void pixels(void)
+{
+    const double sizes[] = {1e-4, 1e-3, 1e-2, 0.1, 0.5, 1, 2}, places[] = {0, 2, 4, 6, 8, 10, 12};
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+        double bad = 0, good = 0;
+        for (int i = 0; i <= 16; i++)
+            pixel_errors(0.25 * i, sizes[k], &bad, &good);
+        printf("pixel/beta %g %.1e %.1e\n", sizes[k], bad, good);
+    }
+    for (size_t k = 0; k < sizeof places / sizeof *places; k++) {
+        double bad = 0, good = 0;
+        pixel_errors(places[k], 0.1, &bad, &good);
+        printf("distance/beta %g %.1e %.1e\n", places[k], bad, good);
     }
 }
 
