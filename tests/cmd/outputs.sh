@@ -12,15 +12,15 @@ before=$(sum)
 # guarded WHAT FILE... -- COMMAND: with OUT in it standing for each of the files in turn, and for another name of the same file,
 # whose suffix promises nothing
 guarded() {
-    local what=$1 files=() f wrong=; shift
+    local what=$1 files=() f g wrong=; shift
     while [ "$1" != -- ]; do files+=("$1"); shift; done
     shift
     for f in "${files[@]}"; do
         ln -f $f $f.in
-        for f in $f $f.in; do
+        for g in $f $f.in; do
             local st=0
-            timeout 60 "${@/OUT/$f}" >o 2>e </dev/null || st=$?
-            if [ $st -eq 2 ]; then grep -q "$f: the name promises" e; else [ $st -eq 1 ] && grep -q "$f: is also an input" e; fi && [ ! -e made ] && [ "$(sum)" = "$before" ] || wrong="$wrong $f: exit $st: $(head -c 200 e);"
+            timeout 60 "${@/OUT/$g}" >o 2>e </dev/null || st=$?
+            if [ $st -eq 2 ]; then grep -q "$g: the name promises" e; else [ $st -eq 1 ] && grep -q "$g: is also an input" e; fi && [ ! -e made ] && [ "$(sum)" = "$before" ] || wrong="$wrong $g: exit $st: $(head -c 200 e);"
             rm -f made
         done
     done
@@ -67,12 +67,12 @@ none "galgen, no models" galgen -n 3 --models nowhere/models -o made
 mkdir disk; trap "umount disk 2>/dev/null" EXIT
 if [ "$(id -u)" = 0 ] && mount -t tmpfs -o size=256k none disk 2>mount.err; then
     full() { # WHAT NAME NAME COMMAND...: two outputs, 20 KiB left on the disk beside the smaller of them
-        local what=$1 a=$2 b=$3 earlier size free; shift 3
+        local what=$1 a=$2 b=$3 earlier size pages free; shift 3
         ok "$what: with room" "$@"
         size=$(wc -c <$a); [ "$(wc -c <$b)" -lt "$size" ] && size=$(wc -c <$b)
         near "$what: the larger does not fit beside the smaller" "$(($(cat $a $b | wc -c) > 2 * size + 20480))" 1 0
         rm -f disk/*
-        free=$((256 - (size + 4095) / 4096 * 4 - 20)); head -c $((free * 1024)) /dev/zero >disk/filler
+        pages=$(((size + 4095) / 4096)) free=$((236 - 4 * pages)); head -c $((free * 1024)) /dev/zero >disk/filler
         fails "$what: a full disk" 1 "$@"
         if [ "$(ls -A disk)" = filler ]; then pass "$what: neither is there"; else fail "$what: $(ls -A disk | tr '\n' ' ')"; fi
         for earlier in $a $b; do

@@ -23,7 +23,7 @@ END
 }
 target() { if [ "$1" = fits2png ]; then echo fits2png.png; else echo "$1.out"; fi; }    # the output of a program
 mkdir ref box
-while read -r c; do $c -o ref/$(target ${c%% *}) 2>/dev/null; done < <(commands)
+while read -r c; do $c -o "ref/$(target ${c%% *})" 2>/dev/null; done < <(commands)
 
 around() { # WHAT COMMAND...: every program, started by COMMAND, gives its bytes
     local what=$1 c name wrong=; shift
