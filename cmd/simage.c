@@ -295,7 +295,7 @@ static void through_wcs(struct input *in, const struct request *r, const struct 
 static void print_plan(FILE *f, const struct plan *p, const struct request *r)
 {
     static const char *const path[PATH_COUNT] = {"outside or dark", "points", "closed-form pixels",
-                                                 "mapped pixels (Gauss-Legendre)", "Fourier stamps"};
+                                                 "mapped pixels (Gauss-Legendre)", "Fourier stamps", "larger than stamps"};
     const struct view *v = &p->view;
     fprintf(f, "simage: %ld x %ld pixels of %g\", %zu parts\n", v->nx, v->ny, v->pixel, p->n);
     fprintf(f, "simage: effects:%s%s%s%s%s%s%s\n", v->psf ? " PSF" : "", r->diffusion > 0 ? " diffusion" : "",
@@ -305,26 +305,31 @@ static void print_plan(FILE *f, const struct plan *p, const struct request *r)
         if (p->count[i])
             fprintf(f, "simage: %zu %s\n", p->count[i], path[i]);
     for (int g = 0; g < p->n_grid; g++) {
-        size_t n = 0;
-        for (size_t i = 0; i < p->n; i++)
+        const struct stamp_grid *t = &p->grid[g];
+        size_t n = 0, broad = 0;
+        for (size_t i = 0; i < p->n; i++) {
             n += p->draw[i].path == PATH_FOURIER && p->draw[i].grid == g;
-        fprintf(f, "simage: %zu stamps of %d x %d, %d frequencies per axis\n", n, p->grid[g].n, p->grid[g].n,
-                2 * p->grid[g].kmax + 1);
+            broad += p->draw[i].path == PATH_BROAD && p->draw[i].grid == g;
+        }
+        if (broad)
+            fprintf(f, "simage: %zu in a period of %g\", %d frequencies per axis\n", broad, t->n * t->pixel, 2 * t->kmax + 1);
+        else
+            fprintf(f, "simage: %zu stamps of %d x %d, %d frequencies per axis\n", n, t->n, t->n, 2 * t->kmax + 1);
     }
     fprintf(f, "simage: accuracy %g of the peak, floor %g electron; %zu transforms, %d shear matrices; about %.2g s and %.0f MB\n",
             p->acc.eps, p->acc.floor, p->fft_plans, p->n_matrix, p->cost,
             1e-6 * (p->bytes + 4.0 * (double)v->nx * (double)v->ny) + 8);
 }
 
-static void report(const struct plan *p, const struct common *c)
+static void report(size_t bad, size_t cut, const struct common *c)
 {
     if (c->quiet)
         return;
-    if (p->n_bad)
-        warn("%s: %zu objects cannot be drawn (no number, order above 66 and turned, or no PSF and too thin to integrate): left out",
-             c->argv[0], p->n_bad);
-    if (p->n_short)
-        warn("%s: %zu stamps end at %d pixels: wings beyond are missing", c->argv[0], p->n_short, p->acc.side_max);
+    if (bad)
+        warn("%s: %zu objects cannot be drawn (no number, order above 66 and turned, or too thin to be integrated): left out",
+             c->argv[0], bad);
+    if (cut)
+        warn("%s: %zu stamps are too small for --accuracy: wings beyond fold back", c->argv[0], cut);
 }
 
 static void make_plan(struct plan *p, const struct view *v, const struct request *r, const struct common *c,
@@ -339,7 +344,7 @@ static void make_plan(struct plan *p, const struct view *v, const struct request
             1e-6 * (p->bytes + 4.0 * (double)v->nx * (double)v->ny));
     if (c->check || c->verbose)
         print_plan(stderr, p, r);
-    report(p, c);
+    report(p->n_bad, p->n_short, c);
 }
 
 static void draw(const struct plan *p, struct image *im, const struct common *c)
@@ -363,7 +368,7 @@ static void draw_field(const struct view *v, const struct request *r, const stru
 {
     struct field f;
     struct progress bar;
-    size_t bad = 0;
+    struct field_losses lost = {0, 0};
     if (field_plan(&f, v, FIELD_MARGIN))
         die(EXIT_RUN, "%s: the field is too large for one convolution: leave --method field out", c->argv[0]);
     if (c->check || c->verbose)
@@ -374,11 +379,10 @@ static void draw_field(const struct view *v, const struct request *r, const stru
     if (c->check)
         return;
     progress_begin(&bar, "simage", (long)e->n, c->quiet);
-    int st = field_render(&f, v, &r->accuracy, e->n, e->emitter, im, c->threads, &bar, &bad);
+    int st = field_render(&f, v, &r->accuracy, e->n, e->emitter, im, c->threads, &bar, &lost);
     progress_end(&bar);
     check(st);
-    if (bad && !c->quiet)
-        warn("%s: %zu objects cannot be drawn: left out", c->argv[0], bad);
+    report(lost.bad, lost.cut, c);
 }
 
 /* New pixels; the header stays. */

@@ -18,7 +18,7 @@ struct accuracy {
     double shear;      /* share for orders cut off in coefficient-space shear; larger: fewer orders */
     double g_matrix;   /* largest |g| sheared in coefficient space when there is a PSF; only speed */
     int order_max;     /* highest order of sheared coefficients; beyond, the shear is evaluated */
-    int side_max;      /* largest stamp, pixels: beyond, wings are cut and the object is counted */
+    int side_max;      /* largest stamp, pixels: larger objects are summed (broad.h), wings beyond are cut and counted */
 };
 
 /* As measured: 1e-5 of the peak, no floor. */

@@ -15,7 +15,7 @@ int field_plan(struct field *f, const struct view *v, double margin)
     const double u = v->psf ? v->psf->ucut : 0;
     if (!(u > 0) || !(v->pixel > 0) || !(margin >= 0) || v->nx < 1 || v->ny < 1)
         return E_RANGE;
-    struct field g = {.split = (int)ceil(3 * u * v->pixel)};    /* 1.5 times the Nyquist rate or more */
+    struct field g = {.split = (int)ceil(3 * u * v->pixel), .margin = 0.5 * margin};    /* 1.5 times the Nyquist rate or more */
     const double fine = v->pixel / g.split, rate = 1 / fine;
     const double pad = margin / v->pixel;
     const double nx = (double)v->nx + pad, ny = (double)v->ny + pad;
@@ -39,9 +39,9 @@ static int flat(struct otf *t, double ucut)
     return otf_sample(t, 1, 1, &one, 0.25 / ucut, 0, 0, ucut);
 }
 
-/* The objects, blurred, as samples times area on the fine grid. */
+/* The objects, blurred, as samples times area on the fine grid; large[i] = 1 for those too large for it, which are left out. */
 static int blurred(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
-                   struct image *fine, int threads, struct progress *bar, size_t *n_bad)
+                   struct image *fine, int threads, struct progress *bar, unsigned char *large, struct field_losses *lost)
 {
     struct otf one = {0};
     struct plan p = {0};
@@ -68,11 +68,18 @@ static int blurred(const struct field *f, const struct view *v, const struct acc
     w.edge[0] = w.edge[1] = 0;
     own.eps = fmax(0.1 * a->eps, 1e-11);
     own.floor = 0.1 * a->floor / ((double)f->split * f->split);
+    own.side_max = (int)fmin(own.side_max, 2 * f->margin / w.pixel);
     st = scene_plan(&p, &w, &own, n, moved);
     if (st == OK) {
-        *n_bad = p.n_bad;
+        *lost = (struct field_losses){p.n_bad, p.n_short};
         st = image_new(fine, w.nx, w.ny);
     }
+    for (size_t i = 0; st == OK && i < n; i++)
+        if (p.draw[i].path == PATH_BROAD || p.draw[i].grid < 0) {
+            large[i] = 1;
+            lost->bad -= p.draw[i].path == PATH_NONE;   /* refused on the fine grid only, perhaps */
+            p.draw[i].path = PATH_NONE;
+        }
     if (st == OK)
         st = scene_render(&p, fine, threads, bar);
     plan_free(&p);
@@ -186,23 +193,51 @@ static int convolve(const struct field *f, const struct view *v, struct image *f
     return st;
 }
 
+/* Add the objects marked, each by itself. */
+static int draw_large(const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e, const unsigned char *large,
+                      struct image *im, int threads, struct field_losses *lost)
+{
+    struct plan p = {0};
+    size_t marked = 0;
+    for (size_t i = 0; i < n; i++)
+        marked += large[i];
+    struct emitter *own = marked ? malloc(n * sizeof *own) : NULL;
+    if (!own)
+        return marked ? E_NOMEM : OK;
+    for (size_t i = 0; i < n; i++) {
+        own[i] = e[i];
+        if (!large[i])
+            own[i].flux = 0;               /* parts of an object keep their places */
+    }
+    int st = scene_plan(&p, v, a, n, own);
+    if (st == OK)
+        st = scene_render(&p, im, threads, NULL);
+    lost->bad += p.n_bad;
+    lost->cut += p.n_short;
+    plan_free(&p);
+    free(own);
+    return st;
+}
+
 int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
-                 struct image *im, int threads, struct progress *bar, size_t *n_bad)
+                 struct image *im, int threads, struct progress *bar, struct field_losses *lost)
 {
     if (im->nx != v->nx || im->ny != v->ny)
         return E_RANGE;
     struct image fine = {0};
     double *out = NULL;
-    int st = blurred(f, v, a, n, e, &fine, threads, bar, n_bad);
+    unsigned char *large = calloc(n + 1, 1);
+    int st = large ? blurred(f, v, a, n, e, &fine, threads, bar, large, lost) : E_NOMEM;
     if (st == OK)
         st = convolve(f, v, &fine, &out);
     image_free(&fine);
-    if (st)
-        return st;
     const double scale = 1 / ((double)f->nx * f->ny);
-    for (long y = 0; y < im->ny; y++)
+    for (long y = 0; st == OK && y < im->ny; y++)
         for (long x = 0; x < im->nx; x++)
             im->pix[y * im->nx + x] += (float)(scale * out[(size_t)(y + f->y0) * (size_t)f->nx + (size_t)(x + f->x0)]);
     fft_free(out);
-    return OK;
+    if (st == OK)
+        st = draw_large(v, a, n, e, large, im, threads, lost);
+    free(large);
+    return st;
 }

@@ -4,7 +4,8 @@
  * output pixels' grid and transformed back.
  *
  * Wings of the PSF are those of the transfer function everywhere in the field; no stamp
- * ends and nothing but the field, padded by its margin, repeats.  The objects' frequencies
+ * ends and nothing but the field, padded by its margin, repeats.  Objects that reach farther than the
+ * margin would be cut by the field's border: they are drawn by themselves, as in scene_plan.  The objects' frequencies
  * beyond the fine grid are held below 1e-9 by the Gaussian, which is divided out again.  Memory
  * 16 bytes per fine pixel, of which there are 1.5 to 3 per telescope's Nyquist interval and axis.
  */
@@ -22,6 +23,7 @@ struct field {
     int nx, ny;            /* output pixels of the padded field */
     int x0, y0;            /* where the image begins in it */
     double sigma;          /* of the Gaussian, arcsec */
+    double margin;         /* arcsec, on each side */
     double bytes;
     double cost;           /* predicted CPU seconds without the objects: transforms of the fine pixels */
 };
@@ -29,12 +31,18 @@ struct field {
 /* Choose the grid; margin in arcsec, half of it on each side. v needs a psf. E_RANGE: fine sides above 32768. */
 MUST_CHECK int field_plan(struct field *f, const struct view *v, double margin);
 
+/* Objects that were not drawn as they should be. */
+struct field_losses {
+    size_t bad;            /* not drawn: n_bad of the plan */
+    size_t cut;            /* n_short of the plan */
+};
+
 /*
- * Add the scene to im (of the view's size).  Objects outside the margin are left out;
- * *n_bad counts those that cannot be drawn.  Error: eps of an object's peak or floor as with stamps, and
+ * Add the scene to im (of the view's size).  Objects outside the margin are left out.
+ * Error: eps of an object's peak or floor as with stamps, and
  * 2e-7 of the peak from float32. E_NOMEM, E_RANGE.
  */
-MUST_CHECK int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n,
-                            const struct emitter *e, struct image *im, int threads, struct progress *bar, size_t *n_bad);
+MUST_CHECK int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
+                            struct image *im, int threads, struct progress *bar, struct field_losses *lost);
 
 #endif

@@ -3,7 +3,8 @@
  *
  * Half side of a stamp = max(radius beyond which PSF wings of that flux stay
  * below the tolerance, radius beyond which the object itself does) + margins;
- * tolerance = max(eps peak, floor).
+ * tolerance = max(eps peak, floor).  Objects too large for the largest stamp have few frequencies: a longer period
+ * and a plain sum over them (broad.h).
  */
 #include "plan.h"
 #include "shapelet.h"
@@ -13,11 +14,18 @@
 #include <string.h>
 
 #define SIDES 34
+#define PERIODS 64             /* of large objects: 64, 128, 256 ... pixels */
+#define CLASSES (SIDES + PERIODS)
+#define BROAD_SIDE 256         /* larger pixels that a long period is counted in */
+#define BROAD_KMAX 16000       /* frequencies per axis of a large object */
 
 #define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
 #define PART_PIXELS 1048576    /* larger stamps are made in parts */
 #define PIXEL_COST 3.5e-9        /* seconds to sum, convert and write a pixel of the image */
-#define MAPPED_LONGEST 10.0    /* seconds for one object without a PSF; those that need more are not drawn */
+#define LONGEST 10.0           /* seconds for one object without a stamp; those that need more are not drawn */
+#define BROAD_X 0.5e-9         /* seconds for one frequency of a large object in one column of the image */
+#define BROAD_Y 0.3e-9         /* and for one row of frequencies in one pixel */
+#define WINGS_LONGEST 0.3      /* the same for an object that a stamp holds, but not its wings */
 
 /* Sides of stamps: multiples of 8 or nearly, with factors 2, 3 and 5. */
 static const int side_of[SIDES] = {12, 16, 20, 24, 32, 40, 48, 64, 72, 80, 96, 120, 128, 144, 160, 180, 200,
@@ -80,9 +88,26 @@ struct maker {
     double group_tol;      /* electrons, for the parts of one object */
     double group_norm;     /* sum of sqrt |flux| of its parts */
     int group_left;        /* parts still to come */
-    int used[SIDES];       /* stamps of a side class; then its grid number + 1 */
-    double top[SIDES];     /* highest frequency step that an object of the class keeps */
+    int used[CLASSES];     /* objects of a class of sides, or of periods; then its grid number + 1 */
+    double top[CLASSES];   /* highest frequency step that an object of the class keeps */
 };
+
+/* Period of a class of long ones, in pixels. */
+static double period_of(int class)
+{
+    return ldexp(64, class - SIDES);
+}
+
+/* Its grid: side, and pixels in arcsec. */
+static int class_side(int class)
+{
+    return class < SIDES ? side_of[class] : BROAD_SIDE;
+}
+
+static double class_pixel(const struct plan *p, int class)
+{
+    return class < SIDES ? p->view.pixel : p->view.pixel * period_of(class) / BROAD_SIDE;
+}
 
 static double stretch_of(double g)
 {
@@ -243,46 +268,121 @@ static int span(double origin, double reach, long n, int *first, int *count)
     return 1;
 }
 
-/* With a PSF: side class and frequencies. Returns 0 when the object does not reach the image. */
-static int plan_fourier(struct maker *m, const struct emitter *s, const struct light *l, struct draw *d)
-{
-    struct plan *p = m->p;
-    const struct wings *w = &p->wings;
-    double own = 0, size = 0;
-    if (s->coef) {
-        double core = w->core / (l->beta * l->stretch);
-        size = 0.9 / sqrt(4 * M_PI * l->power);   /* rms of a Gaussian of that power, and a margin */
-        own = own_reach(m, s, l) * sqrt(1 + core * core) + (p->view.ipc > 0 ? p->view.pitch : 0);
-    }
-    int side = 0, good;
-    for (;; side++) {
-        double half = (side_of[side] / 2 - 1) * p->view.pixel;
-        good = half >= own && wings_folded(w, size, half, side_of[side]) <= p->acc.wing * l->tol;
-        if (good || side == SIDES - 1 || side_of[side + 1] > p->acc.side_max)
-            break;
-    }
-    if (!place(&p->view, s, side_of[side], d))
-        return 0;
-    p->n_short += !good;
+/* With a PSF: what an object needs of its stamp. */
+struct need {
+    double own, size;      /* arcsec: beyond `own` there is none of its light; rms */
+};
 
-    /* smallest frequency beyond which bound of |F| times integral of |T| stays below its share */
-    double limit = p->acc.band * l->tol;
-    int lo = 0, hi = w->nu - 1;
+static struct need need_of(const struct maker *m, const struct emitter *s, const struct light *l)
+{
+    const struct plan *p = m->p;
+    if (!s->coef)
+        return (struct need){0, 0};
+    const double core = p->wings.core / (l->beta * l->stretch);
+    return (struct need){own_reach(m, s, l) * sqrt(1 + core * core) + (p->view.ipc > 0 ? p->view.pitch : 0),
+                         0.9 / sqrt(4 * M_PI * l->power)};   /* of a Gaussian of that power, and a margin */
+}
+
+/* A period of n pixels repeats nothing that counts. */
+static int period_good(const struct plan *p, const struct need *q, const struct light *l, double n)
+{
+    const double half = (n / 2 - 1) * p->view.pixel;
+    return half >= q->own && wings_folded(&p->wings, q->size, half, n) <= p->acc.wing * l->tol;
+}
+
+/* Bound of the object's transform at frequency u, times the integral of |T| beyond. */
+static double band_beyond(const struct maker *m, const struct emitter *s, const struct light *l, double u)
+{
+    double f = 1;
+    if (s->coef)
+        f = fmin(10, 2 * M_PI * l->beta * envelope_value(&m->env, s->nmax, m->shells, 2 * M_PI * l->beta * u / l->stretch));
+    return f * wings_tail(&m->p->wings, u);
+}
+
+/* Smallest i of 0..last for which nothing that counts is beyond the frequency i du. */
+static int band_end(const struct maker *m, const struct emitter *s, const struct light *l, double du, int last)
+{
+    int lo = 0, hi = last;
     while (lo < hi) {
-        int mid = (lo + hi) / 2;
-        double f = 1;
-        if (s->coef)
-            f = fmin(10, 2 * M_PI * l->beta
-                     * envelope_value(&m->env, s->nmax, m->shells, 2 * M_PI * l->beta * mid * w->du / l->stretch));
-        if (f * w->tail[mid] <= limit)
+        const int mid = (lo + hi) / 2;
+        if (band_beyond(m, s, l, mid * du) <= m->p->acc.band * l->tol)
             hi = mid;
         else
             lo = mid + 1;
     }
-    d->kcut = (float)(ceil(lo * w->du * side_of[side] * p->view.pixel) + 1);
-    d->grid = (short)side;                 /* side class; becomes the number of a grid later */
-    m->used[side]++;
-    m->top[side] = fmax(m->top[side], d->kcut);
+    return lo;
+}
+
+static void enlist(struct maker *m, struct draw *d, int class, double kcut)
+{
+    d->kcut = (float)kcut;
+    d->grid = (short)class;                /* becomes the number of a grid later */
+    m->used[class]++;
+    m->top[class] = fmax(m->top[class], d->kcut);
+}
+
+/* CPU seconds for an object of k frequencies per axis. */
+static double broad_cost(const struct emitter *s, const struct draw *d, double k, int turned)
+{
+    const double orders = s->coef ? s->nmax + 1 : 0, plane = 0.8 * k * k;
+    const double rows = plane * (10e-9 + (turned ? 20e-9 + 2e-9 * orders : 0.25e-9 * orders));
+    const double pieces = 1 + floor((double)d->nx * d->ny / PART_PIXELS);
+    return pieces * (1e-5 + rows) + plane * BROAD_X * d->nx * pieces + k * BROAD_Y * d->nx * d->ny;
+}
+
+/* Longer period, fewer frequencies. *seconds: what it takes; infinite when it cannot be. Returns 0 outside the image. */
+static int plan_broad(struct maker *m, const struct emitter *s, const struct light *l, const struct need *q, struct draw *d,
+                      int *class, double *kcut, double *seconds)
+{
+    const struct plan *p = m->p;
+    *seconds = INFINITY;
+    for (*class = SIDES; *class < CLASSES; ++*class)
+        if (period_good(p, q, l, period_of(*class)))
+            break;
+    if (*class == CLASSES)
+        return 1;
+    const double n = period_of(*class), half = n / 2;
+    /* steps of the object's bound, of 1/8 in units of 1/beta, or of T's */
+    const double own = s->coef ? l->stretch / (16 * M_PI * l->beta) : INFINITY, du = fmin(own, p->wings.du);
+    const double last = own > du ? p->wings.nu : fmin(ceil(p->wings.nu * p->wings.du / du), (double)m->env.steps);
+    *kcut = ceil(band_end(m, s, l, du, (int)last) * du * n * p->view.pixel) + 1;
+    if (!span(s->x, half, p->view.nx, &d->x0, &d->nx) || !span(s->y, half, p->view.ny, &d->y0, &d->ny))
+        return 0;
+    if (*kcut < BROAD_KMAX)
+        *seconds = broad_cost(s, d, *kcut, d->mapped);
+    return 1;
+}
+
+/* With a PSF: class and frequencies. Returns 0 when the object does not reach the image or cannot be drawn. */
+static int plan_fourier(struct maker *m, const struct emitter *s, const struct light *l, struct draw *d)
+{
+    struct plan *p = m->p;
+    const struct need q = need_of(m, s, l);
+    int side = 0, class, good;
+    double kcut, seconds;
+    d->path = PATH_FOURIER;
+    while (!(good = period_good(p, &q, l, side_of[side])) && side < SIDES - 1 && side_of[side + 1] <= p->acc.side_max)
+        side++;
+    if (!good) {
+        const int held = (side_of[side] / 2 - 1) * p->view.pixel >= q.own;
+        if (!plan_broad(m, s, l, &q, d, &class, &kcut, &seconds))
+            return 0;
+        if (seconds < (held ? WINGS_LONGEST : LONGEST)) {
+            d->path = PATH_BROAD;
+            enlist(m, d, class, kcut);
+            return 1;
+        }
+        if (!held) {
+            p->n_bad++;
+            d->grid = -1;
+            return 0;
+        }
+    }
+    if (!place(&p->view, s, side_of[side], d))
+        return 0;
+    p->n_short += !good;
+    const int end = band_end(m, s, l, p->wings.du, p->wings.nu - 1);
+    enlist(m, d, side, ceil(end * p->wings.du * side_of[side] * p->view.pixel) + 1);
     return 1;
 }
 
@@ -319,7 +419,7 @@ static int plan_direct(struct maker *m, const struct emitter *s, const struct po
     }
     d->path = d->mapped ? PATH_MAPPED : PATH_CLOSED;
     const double nodes = mapped_nodes(s, l->stretch);
-    if (d->mapped && !(nodes < 1e7 && mapped_cost(s, nodes) < MAPPED_LONGEST)) {
+    if (d->mapped && !(nodes < 1e7 && mapped_cost(s, nodes) < LONGEST)) {
         m->p->n_bad++;
         return 0;
     }
@@ -339,6 +439,8 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
         struct pose q;
         return pose_of(&p->view, s, &q) ? 0 : mapped_cost(s, mapped_nodes(s, stretch_of(q.g)));
     }
+    if (d->path == PATH_BROAD)
+        return matrix + broad_cost(s, d, d->kcut, d->mapped);
     if (d->path != PATH_FOURIER)
         return 1e-7;
     const struct stamp_grid *g = &p->grid[d->grid];
@@ -395,7 +497,8 @@ static int plan_one(struct maker *m, size_t i)
             return st;
     }
     if (p->view.psf) {
-        d->path = plan_fourier(m, s, &l, d) ? PATH_FOURIER : PATH_NONE;
+        if (!plan_fourier(m, s, &l, d))
+            d->path = PATH_NONE;
     } else if (!plan_direct(m, s, &q, &l, d)) {
         d->path = PATH_NONE;
     }
@@ -436,30 +539,30 @@ struct stamp_response view_response(const struct view *v)
     return r;
 }
 
-/* A side class's transfer function: a view of the PSF's with a lower cut-off, so that no frequency is tabulated that nobody keeps. */
-static struct otf class_otf(const struct maker *m, int side)
+/* A class's transfer function: a view of the PSF's with a lower cut-off, so that no frequency is tabulated that nobody keeps. */
+static struct otf class_otf(const struct maker *m, int class)
 {
     struct otf t = *m->p->view.psf;
-    t.ucut = fmin(t.ucut, (m->top[side] + 1) / (side_of[side] * m->p->view.pixel));
+    t.ucut = fmin(t.ucut, (m->top[class] + 1) / (class_side(class) * class_pixel(m->p, class)));
     return t;
 }
 
 /* Which classes get a table: those with most stamps, as long as the tables fit. */
-static void choose_tables(const struct maker *m, int table[SIDES])
+static void choose_tables(const struct maker *m, int table[CLASSES])
 {
     const struct plan *p = m->p;
     const int complex_t = !otf_is_real(p->view.psf);
     double left = TABLE_BYTES;
-    memset(table, 0, SIDES * sizeof *table);
+    memset(table, 0, CLASSES * sizeof *table);
     for (;;) {
         int best = -1;
-        for (int side = 0; side < SIDES; side++)
-            if (m->used[side] && !table[side] && (best < 0 || m->used[side] > m->used[best]))
-                best = side;
+        for (int class = 0; class < CLASSES; class++)
+            if (m->used[class] && !table[class] && (best < 0 || m->used[class] > m->used[best]))
+                best = class;
         if (best < 0)
             return;
         const struct otf t = class_otf(m, best);
-        const double bytes = stamp_grid_bytes(t.ucut, p->view.pixel, side_of[best], complex_t);
+        const double bytes = stamp_grid_bytes(t.ucut, class_pixel(p, best), class_side(best), complex_t);
         table[best] = !t.sre || bytes <= left ? 1 : -1;
         left -= table[best] > 0 ? bytes : 0;
     }
@@ -479,27 +582,28 @@ static int finish_grids(struct maker *m)
 {
     struct plan *p = m->p;
     const struct stamp_response r = view_response(&p->view);
-    int table[SIDES];
-    p->grid = calloc(SIDES, sizeof *p->grid);
+    int table[CLASSES];
+    p->grid = calloc(CLASSES, sizeof *p->grid);
     if (!p->grid)
         return E_NOMEM;
     choose_tables(m, table);
-    for (int side = 0; side < SIDES; side++) {
-        if (!m->used[side])
+    for (int class = 0; class < CLASSES; class++) {
+        if (!m->used[class])
             continue;
-        const struct otf t = class_otf(m, side);
-        int st = stamp_grid_lean(&p->grid[p->n_grid], &t, &r, p->view.pixel, side_of[side], parts_of(side_of[side]), table[side] > 0);
+        const struct otf t = class_otf(m, class);
+        const int n = class_side(class), parts = class < SIDES ? parts_of(n) : 1;
+        int st = stamp_grid_lean(&p->grid[p->n_grid], &t, &r, class_pixel(p, class), n, parts, table[class] > 0);
         if (st)
             return st;
-        p->fft_plans++;
-        if (table[side] > 0)
-            p->bytes += stamp_grid_bytes(t.ucut, p->view.pixel, side_of[side], !otf_is_real(p->view.psf));
+        p->fft_plans += class < SIDES;
+        if (table[class] > 0)
+            p->bytes += stamp_grid_bytes(t.ucut, class_pixel(p, class), n, !otf_is_real(p->view.psf));
         else
             p->lean = 1;
-        m->used[side] = ++p->n_grid;
+        m->used[class] = ++p->n_grid;
     }
     for (size_t i = 0; i < p->n; i++)
-        if (p->draw[i].path == PATH_FOURIER)
+        if (p->draw[i].path == PATH_FOURIER || p->draw[i].path == PATH_BROAD)
             p->draw[i].grid = (short)(m->used[p->draw[i].grid] - 1);
     return OK;
 }

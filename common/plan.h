@@ -62,15 +62,16 @@ enum path {
     PATH_POINT,            /* all flux into one pixel (no PSF) */
     PATH_CLOSED,           /* pixel integrals in closed form (no PSF) */
     PATH_MAPPED,           /* sheared pixel integrals, Gauss-Legendre along x (no PSF) */
-    PATH_FOURIER           /* k-space with alias folding */
+    PATH_FOURIER,          /* k-space with alias folding */
+    PATH_BROAD             /* too large for a stamp: few frequencies of a long period, summed (broad.h) */
 };
-#define PATH_COUNT 5
+#define PATH_COUNT 6
 
 /* How one object is drawn. */
 struct draw {
     unsigned char path;
     unsigned char mapped;  /* shear by evaluating the mapped basis */
-    short grid;            /* plan.grid */
+    short grid;            /* plan.grid; -1 with PATH_NONE: too large and thin to be drawn in reasonable time */
     short matrix;          /* plan.matrix or -1 */
     short grown;           /* orders after an own coefficient-space shear, or 0 */
     int x0, y0, nx, ny;    /* stamp: first pixel in the image, sides */
@@ -90,7 +91,7 @@ struct plan {
     const struct emitter *emitter;      /* not owned */
     struct draw *draw;                /* n */
     int n_grid;
-    struct stamp_grid *grid;          /* side classes in use */
+    struct stamp_grid *grid;          /* classes of sides and of long periods in use */
     int lean;                         /* some have no table: the PSF's spline must outlive the plan */
     int n_matrix;
     struct matrix *matrix;
@@ -101,8 +102,8 @@ struct plan {
 
     /* for reports */
     size_t count[PATH_COUNT];
-    size_t n_short;                   /* stamps that side_max cut short of the wanted accuracy */
-    size_t n_bad;                     /* objects that are not numbers, of an order that cannot be turned, or too skew for quadrature */
+    size_t n_short;                   /* stamps of side_max whose wings, beyond it, repeat above the wanted accuracy */
+    size_t n_bad;                     /* objects that are not numbers, of an order that cannot be turned, or too thin to be summed */
     double cost;                      /* predicted CPU seconds on one thread */
     double bytes;                     /* memory of tables and draws */
     size_t fft_plans;                 /* FFT plans made: 0 without a PSF */

@@ -238,7 +238,7 @@ void wings_free(struct wings *w)
     *w = (struct wings){0};
 }
 
-double wings_folded(const struct wings *w, double sigma, double half, int n)
+double wings_folded(const struct wings *w, double sigma, double half, double n)
 {
     /* nearer the border of the table its own replicas count: continue by the laws r^-3 and r^-1 */
     const int last = w->n - w->n / 8;
@@ -250,11 +250,11 @@ double wings_folded(const struct wings *w, double sigma, double half, int n)
     const int k = half <= 0 ? 0 : half < last * w->dr ? (int)(half / w->dr) : last;
     const double far = near > last * w->dr ? near / (last * w->dr) : 1;
     const double out = half > last * w->dr ? half / (last * w->dr) : 1;
-    return w->w[l][i] / (far * far * far) + w->out[k] / out / ((double)n * n);
+    return w->w[l][i] / (far * far * far) + w->out[k] / out / (n * n);
 }
 
 double wings_tail(const struct wings *w, double u)
 {
-    double i = u / w->du;
+    double i = u / w->du * (1 + 1e-12);
     return i < w->nu ? w->tail[(int)i] : 0;
 }

@@ -65,7 +65,7 @@ void wings_free(struct wings *w);
  * the flux, for an object of rms size sigma (arcsec, along one axis): the nearest replica's
  * wing and the mean of all replicas, the flux outside spread over the stamp.
  */
-double wings_folded(const struct wings *w, double sigma, double half, int n);
+double wings_folded(const struct wings *w, double sigma, double half, double n);
 
 /* pixel^2 times the integral of |T| beyond u. */
 double wings_tail(const struct wings *w, double u);

@@ -80,6 +80,8 @@ static int draw_piece(const struct plan *p, const struct entry *e, struct stamp_
         if (e->row < 0)
             return stamp_fourier_part(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, q.first, out);
         return stamp_fourier(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, out);
+    case PATH_BROAD:
+        return stamp_broad(&p->grid[d->grid], w, &shape, v->pixel, d->nx, q.rows, x, y - q.first, s->flux, d->kcut, out);
     case PATH_NONE:
         break;
     }

@@ -7,6 +7,7 @@
  * phi_n(-k) = (-1)^n phi_n(k) gives the rows -u_y from the rows u_y.
  */
 #include "stamp.h"
+#include "broad.h"
 #include "shapelet.h"
 #include "shear.h"
 #include "simd.h"
@@ -551,6 +552,23 @@ static void transfer_row(const struct transform *t, int ky, int m, int side, con
     *im = t->t[2 + side];
 }
 
+/* Rows +-ky: transform, transfer function, phases along x; in columns 0..*m-1. */
+static int make_rows(const struct transform *t, double kcut, int ky, const struct row *r, int *m)
+{
+    const struct stamp_grid *g = t->g;
+    const double reach = sqrt(kcut * kcut - (double)ky * ky);
+    const double *up[2], *down[2];
+    *m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
+    int st = transform_row(t, ky, *m, r);
+    if (st)
+        return st;
+    transfer_row(t, ky, *m, 0, &up[0], &up[1]);
+    row_transfer(*m, up[0], up[1], t->p_re, t->p_im, r->p_re, r->p_im);
+    transfer_row(t, -ky, *m, 1, &down[0], &down[1]);
+    row_transfer(*m, down[0], down[1], t->p_re, t->p_im, r->m_re, r->m_im);
+    return OK;
+}
+
 /* All rows: transform, transfer function, phases, aliases; into f. */
 static int fold_rows(const struct transform *t, double kcut, double scale, const struct row *r, const struct plane *f)
 {
@@ -558,16 +576,9 @@ static int fold_rows(const struct transform *t, double kcut, double scale, const
     const int rows = g->n / g->parts, top = kcut < g->kmax ? (int)kcut : g->kmax, single = top < rows / 2;
     clear(f, rows, single, top);
     for (int ky = 0; ky <= top; ky++) {
-        double reach = sqrt(kcut * kcut - (double)ky * ky);
-        int m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
-        const double *up[2], *down[2];
-        int st = transform_row(t, ky, m, r);
+        int m, st = make_rows(t, kcut, ky, r, &m);
         if (st)
             return st;
-        transfer_row(t, ky, m, 0, &up[0], &up[1]);
-        row_transfer(m, up[0], up[1], t->p_re, t->p_im, r->p_re, r->p_im);
-        transfer_row(t, -ky, m, 1, &down[0], &down[1]);
-        row_transfer(m, down[0], down[1], t->p_re, t->p_im, r->m_re, r->m_im);
         (single ? put_row : add_folded)(t, ky, m, scale * t->y_re[ky], scale * t->y_im[ky], r, f);
     }
     return OK;
@@ -647,6 +658,51 @@ int stamp_fourier_part(const struct stamp_grid *g, struct stamp_work *w, const s
     if (st == OK)
         lanes_run_in_place(g->fft, f.columns, plane, (int)width, (int)(2 * width), w->freq);
     return st;
+}
+
+/* (re + i im) times c + i d, columns 0..m-1. */
+static void row_turn(int m, double c, double d, double *re, double *im)
+{
+    for (int k = 0; k < m; k++) {
+        const double a = re[k], b = im[k];
+        re[k] = a * c - b * d;
+        im[k] = a * d + b * c;
+    }
+}
+
+int stamp_broad(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double pixel, int nx, int ny, double x,
+                double y, double flux, double kcut, double *out)
+{
+    if (!drawable(s, x, y, flux, kcut) || g->parts != 1 || !(pixel > 0) || nx < 1 || ny < 1)
+        return E_RANGE;
+    const int top = kcut < g->kmax ? (int)kcut : g->kmax;
+    const size_t ld = round8((size_t)top + 1);
+    const double step = pixel / (g->n * g->pixel);
+    struct transform t = {0};
+    struct broad b;
+    int st = freq_need(w, 4 * ld + broad_scratch((int)ld));
+    if (st == OK)
+        st = transform_start(&t, w, g, s, top + 1);
+    if (st)
+        return st;
+    const struct row r = {w->freq, w->freq + ld, w->freq + 2 * ld, w->freq + 3 * ld};
+    double scale = flux * step * step;
+    if (s->coef)
+        scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
+    phases(t.ld, x * pixel / g->pixel, g->n, t.p_re, t.p_im);
+    phases(t.ld, y * pixel / g->pixel, g->n, t.y_re, t.y_im);
+    broad_begin(&b, step, nx, ny, out, (int)ld, w->freq + 4 * ld);
+    for (int ky = 0; ky <= top; ky++) {
+        int m;
+        st = make_rows(&t, kcut, ky, &r, &m);
+        if (st)
+            return st;
+        row_turn(m, scale * t.y_re[ky], scale * t.y_im[ky], r.p_re, r.p_im);
+        row_turn(m, scale * t.y_re[ky], -scale * t.y_im[ky], r.m_re, r.m_im);
+        broad_take(&b, ky, m, r.p_re, r.p_im, r.m_re, r.m_im);
+    }
+    broad_end(&b);
+    return OK;
 }
 
 /* ---- without a PSF ---- */

@@ -105,6 +105,13 @@ MUST_CHECK int stamp_fourier_part(const struct stamp_grid *g, struct stamp_work 
                                   double flux, double kcut, int part, double *plane);
 size_t stamp_stride(int n);
 
+/*
+ * Any nx x ny pixels of an object of few frequencies: g has the period, n g->pixel, and one part; the pixels
+ * have the side `pixel` and x, y count them.  kcut may be beyond n / 2 (broad.h).
+ */
+MUST_CHECK int stamp_broad(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double pixel, int nx, int ny,
+                           double x, double y, double flux, double kcut, double *out);
+
 /* ---- without a PSF ---- */
 
 /*
