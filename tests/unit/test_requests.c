@@ -265,7 +265,7 @@ static void report(const struct request *q, int n, struct found *f)
 
 static void requested(const struct request *q, const struct otf *t, const struct scene *all, const struct models *m, int step)
 {
-    struct view v = {.nx = 6000, .ny = 6000, .pixel = q->pixel, .diffusion = q->psf ? 0.04 : 0, .psf = q->psf ? t : NULL, .g1 = -0.03, .g2 = 0.04};
+    struct view v = {.nx = ROOM, .ny = ROOM, .pixel = q->pixel, .diffusion = q->psf ? 0.04 : 0, .psf = q->psf ? t : NULL, .g1 = -0.03, .g2 = 0.04};
     struct accuracy a = ACCURACY_DEFAULT;
     struct scene s = {.where = SCENE_PIXEL, .object = calloc(all->n, sizeof *s.object)};
     double *x = malloc(2 * all->n * sizeof *x);
@@ -277,8 +277,8 @@ static void requested(const struct request *q, const struct otf *t, const struct
     for (size_t i = 0; i < all->n; i += (size_t)step) {
         if (all->object[i].type == OBJECT_SERSIC && s.n % 3 == 2 && step > 1)
             continue;
-        x[s.n] = 3000 + uniform((int)i, 12);
-        x[all->n + s.n] = 3000 + uniform((int)i, 13);
+        x[s.n] = ROOM / 2 + uniform((int)i, 12);
+        x[all->n + s.n] = ROOM / 2 + uniform((int)i, 13);
         s.object[s.n++] = all->object[i];
     }
     if (emission_new(&e, &s, m, x, x + all->n, NULL, 2000) || scene_plan(&p, &v, &a, e.n, e.emitter) || stamp_work_new(&r.work))
