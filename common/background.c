@@ -32,17 +32,21 @@ struct range {
     int64_t below_at;
 };
 
-/* Number, sum and sum of squares of t with |t - centre| <= reach; n is a multiple of LANES. */
+typedef double v8 __attribute__((vector_size(64), aligned(8), may_alias));
+
+/* Number, sum and sum of squares of t with |t - centre| <= reach; n, at most SAMPLE + LANES, is a multiple of LANES. */
 WIDE static void clipped_sums(const double *t, long n, double centre, double reach, double out[3])
 {
-    double c[LANES] = {0}, s[LANES] = {0}, q[LANES] = {0};
-    for (long i = 0; i < n; i += LANES)
-        for (int j = 0; j < LANES; j++) {
-            double v = t[i + j], w = fabs(v - centre) <= reach ? 1 : 0;
-            c[j] += w;
-            s[j] += w * v;
-            q[j] += w * v * v;
-        }
+    double weight[SAMPLE + LANES];
+    v8 c = {0}, s = {0}, q = {0};
+    for (long i = 0; i < n; i++)
+        weight[i] = fabs(t[i] - centre) <= reach ? 1 : 0;
+    for (long i = 0; i < n; i += LANES) {
+        v8 v = *(const v8 *)(const void *)(t + i), w = *(const v8 *)(const void *)(weight + i);
+        c += w;
+        s += w * v;
+        q += w * v * v;
+    }
     out[0] = out[1] = out[2] = 0;
     for (int j = 0; j < LANES; j++) {
         out[0] += c[j];

@@ -336,29 +336,27 @@ struct weights {
     long n, rows;
 };
 
+typedef double v8 __attribute__((vector_size(64), aligned(8), may_alias));
+typedef float f8 __attribute__((vector_size(32), aligned(4), may_alias));
+
 /* Sums of v W, v W r^2, v W dx, v W dy, LANES columns at a time. */
 WIDE static void stamp_sums(const float *v, long stride, const struct weights *w, double out[4])
 {
-    double t[4][LANES] = {{0}};
+    v8 t[4] = {{0}};
     for (long x = 0; x < w->n; x += LANES) {
-        double s[3][LANES] = {{0}};        /* of the rows: weighted by wy, wy dy, wy dy^2 */
+        v8 s0 = {0}, s1 = {0}, s2 = {0};   /* of the rows: weighted by wy, wy dy, wy dy^2 */
         for (long y = 0; y < w->rows; y++) {
             double w0 = w->wy[y], w1 = w0 * w->dy[y], w2 = w1 * w->dy[y];
-            const float *p = v + y * stride + x;
-            for (int j = 0; j < LANES; j++) {
-                double f = (double)p[j];
-                s[0][j] += w0 * f;
-                s[1][j] += w1 * f;
-                s[2][j] += w2 * f;
-            }
+            v8 f = __builtin_convertvector(*(const f8 *)(const void *)(v + y * stride + x), v8);
+            s0 += w0 * f;
+            s1 += w1 * f;
+            s2 += w2 * f;
         }
-        for (int j = 0; j < LANES; j++) {
-            double wx = w->wx[x + j], dx = w->dx[x + j];
-            t[0][j] += wx * s[0][j];
-            t[1][j] += wx * (s[2][j] + dx * dx * s[0][j]);
-            t[2][j] += wx * dx * s[0][j];
-            t[3][j] += wx * s[1][j];
-        }
+        v8 wx = *(const v8 *)(const void *)(w->wx + x), dx = *(const v8 *)(const void *)(w->dx + x);
+        t[0] += wx * s0;
+        t[1] += wx * (s2 + dx * dx * s0);
+        t[2] += wx * dx * s0;
+        t[3] += wx * s1;
     }
     for (int k = 0; k < 4; k++) {
         out[k] = 0;
