@@ -82,20 +82,17 @@ void deblend_work_free(struct deblend_work *w)
 
 static int load(struct deblend_work *w, const struct segments *s, size_t c)
 {
-    size_t n = 0;
-    for (size_t i = s->first[c]; i < s->first[c + 1]; i++)
-        n += (size_t)(s->run[i].x1 - s->run[i].x0);
+    size_t n = s->at[c + 1] - s->at[c];
     if (n > INT32_MAX - 8)
         return E_RANGE;
     int st = grow(&w->pixel, &w->cap_pixel, n, sizeof *w->pixel);
     if (st)
         return st;
     int32_t k = 0;
+    const float *v = s->smooth + s->at[c];
     for (size_t i = s->first[c]; i < s->first[c + 1]; i++)
         for (int32_t x = s->run[i].x0; x < s->run[i].x1; x++)
-            w->pixel[k++] = (struct pixel){.v = s->smooth[s->run[i].at + (size_t)(x - s->run[i].x0)],
-                                           .x = (uint16_t)x, .y = (uint16_t)s->run[i].y,
-                                           .next = -1, .set = -1};
+            w->pixel[k++] = (struct pixel){.v = *v++, .x = (uint16_t)x, .y = s->run[i].y, .next = -1, .set = -1};
     w->npixel = k;
     return OK;
 }
@@ -668,7 +665,7 @@ static int measure_parts(const struct segments *s, size_t c, const struct deblen
     int32_t i = 0;
     for (size_t r = s->first[c]; r < s->first[c + 1]; r++)
         for (int32_t x = s->run[r].x0; x < s->run[r].x1; x++, i++) {
-            size_t at = s->run[r].at + (size_t)(x - s->run[r].x0);
+            size_t at = s->at[c] + (size_t)i;
             w->pixel[i].set = w->queue[w->pixel[i].set];
             struct blob *b = &out->blob[base + (size_t)w->pixel[i].set];
             add_pixel_to(b, x, s->run[r].y, (double)s->smooth[at], (double)s->value[at]);
@@ -694,9 +691,9 @@ static int measure_whole(const struct segments *s, size_t c, const struct deblen
     b.x0 = first->x0;
     b.y0 = first->y;
     b.threshold = threshold;
+    size_t at = s->at[c];
     for (const struct run *r = first; r < end; r++)
-        for (int32_t x = r->x0; x < r->x1; x++) {
-            size_t at = r->at + (size_t)(x - r->x0);
+        for (int32_t x = r->x0; x < r->x1; x++, at++) {
             add_pixel_to(&b, x, r->y, (double)s->smooth[at], (double)s->value[at]);
             add_moments(&b, x, r->y, (double)s->smooth[at]);
         }
@@ -704,17 +701,14 @@ static int measure_whole(const struct segments *s, size_t c, const struct deblen
     long k = p->min_area < b.n ? p->min_area : b.n;
     if (with_margin && k <= FEW) {
         struct largest top = {.room = k};
-        for (const struct run *r = first; r < end; r++)
-            for (const float *v = s->smooth + r->at, *stop = v + (r->x1 - r->x0); v < stop; v++)
-                largest_add(&top, *v);
+        for (const float *v = s->smooth + s->at[c], *stop = s->smooth + at; v < stop; v++)
+            largest_add(&top, *v);
         b.margin = (double)top.v[k - 1] - threshold;
     } else if (with_margin) {
         st = grow(&w->sorted, &w->cap_sorted, (size_t)b.n, sizeof *w->sorted);
         if (st)
             return st;
-        float *to = w->sorted;
-        for (const struct run *r = first; r < end; to += r->x1 - r->x0, r++)
-            memcpy(to, s->smooth + r->at, (size_t)(r->x1 - r->x0) * sizeof *to);
+        memcpy(w->sorted, s->smooth + s->at[c], (size_t)b.n * sizeof *w->sorted);
         b.margin = kth_largest(w->sorted, b.n, k) - threshold;
     }
     out->blob[out->n++] = b;
@@ -726,9 +720,7 @@ int deblend_component(const struct segments *s, size_t c, const struct deblend_p
 {
     if (p->levels < 1 || p->levels > 1024 || !(p->contrast >= 0))
         return E_RANGE;
-    size_t size = 0;
-    for (size_t i = s->first[c]; i < s->first[c + 1]; i++)
-        size += (size_t)(s->run[i].x1 - s->run[i].x0);
+    size_t size = s->at[c + 1] - s->at[c];
     double threshold = component_threshold(s, c, p);
     if (p->most && size > p->most) {
         int st = measure_whole(s, c, p, threshold, 0, w, out);

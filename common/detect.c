@@ -168,38 +168,52 @@ static int join_lists(struct blob_list *all, struct blob_list *list, long n, siz
     int st = grow(&all->blob, &all->cap, total + 1, sizeof *all->blob);
     if (st)
         return st;
-    for (long i = 0; i < n; i++)
+    for (long i = 0; i < n; i++) {         /* a list goes as its objects come */
         if (list[i].n)
             memcpy(all->blob + base[i], list[i].blob, list[i].n * sizeof *all->blob);
+        free(list[i].blob);
+        list[i] = (struct blob_list){0};
+    }
     all->n = total;
     return OK;
 }
 
-/* Labels from runs and their pixels' objects. number: the label of every object before cleaning. */
-static int label_runs(const struct image *im, const struct split *t, const size_t *base, const int32_t *number,
-                      struct labels *l)
+/* Count the runs of single objects, or with their labels put them: number[i], that of object i before cleaning. */
+static void label_runs(const struct split *t, const size_t *base, const int32_t *number, struct labels *l)
 {
     const struct segments *s = t->s;
-    size_t n = 0, cap = 0;
-    struct label_run *run = NULL;
-    int st = grow(&run, &cap, s->nrun + 1, sizeof *run);
-    for (size_t i = 0; i < s->nrun && !st; i++) {
-        const struct run *r = &s->run[s->order[i]];
-        const int32_t *mine = t->owner + r->at, *of = number + base[r->component / COMPONENTS];
-        int32_t whole = t->whole[r->component];
-        for (int32_t x = r->x0, end; x < r->x1 && !st; x = end) {
-            int32_t k = whole >= 0 ? whole : mine[x - r->x0];
-            for (end = whole >= 0 ? r->x1 : x + 1; end < r->x1 && mine[end - r->x0] == k;)
-                end++;
-            st = grow(&run, &cap, n + 1, sizeof *run);
-            if (!st)
-                run[n++] = (struct label_run){r->y, x, end, of[k]};
-        }
+    for (size_t c = 0; c < s->ncomponent; c++) {
+        const int32_t *mine = t->owner + s->at[c], *of = number ? number + base[c / COMPONENTS] : NULL;
+        const int32_t whole = t->whole[c];
+        for (const struct run *r = s->run + s->first[c], *stop = s->run + s->first[c + 1]; r < stop; mine += r->x1 - r->x0, r++)
+            for (int32_t x = r->x0, end; x < r->x1; x = end) {
+                int32_t k = whole >= 0 ? whole : mine[x - r->x0];
+                for (end = whole >= 0 ? r->x1 : x + 1; end < r->x1 && mine[end - r->x0] == k;)
+                    end++;
+                if (of)
+                    labels_put(l, r->y, x, end, of[k]);
+                else
+                    labels_count(l, r->y);
+            }
     }
-    if (!st)
-        st = labels_new(l, im->nx, im->ny, run, n);
+}
+
+static int label_all(const struct image *im, const struct split *t, const size_t *base, const int32_t *number, struct labels *l)
+{
+    struct labels made;
+    int st = labels_new(&made, im->nx, im->ny);
     if (st)
-        free(run);
+        return st;
+    label_runs(t, base, NULL, &made);
+    st = labels_room(&made);
+    if (!st) {
+        label_runs(t, base, number, &made);
+        st = labels_sort(&made);
+    }
+    if (st)
+        labels_free(&made);
+    else
+        *l = made;
     return st;
 }
 
@@ -225,7 +239,7 @@ static int settle(const struct image *im, const struct detect_params *p, struct 
         d->found = n;
         d->cleaned = n - kept;
         all->n = kept;
-        st = label_runs(im, t, base, number, &d->label);
+        st = label_all(im, t, base, number, &d->label);
     }
     free(number);
     free(into);
@@ -241,7 +255,7 @@ static int separate(const struct image *im, const float *map, const struct detec
         .levels = p->levels, .contrast = p->contrast, .min_area = p->min_area, .rms_map = map,
         .branch_area = p->min_area < BRANCH ? p->min_area : BRANCH,
         .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx,
-        .most = image_count(im) / 8 > DETECT_MOST ? image_count(im) / 8 : DETECT_MOST
+        .most = DETECT_MOST + image_count(im) / DETECT_PART
     };
     struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)), malloc((s->ncomponent + 1) * sizeof(int32_t)),
                           calloc((size_t)tasks + 1, sizeof(struct blob_list)),

@@ -1,10 +1,12 @@
 /*
  * detect.h - from an image to measured objects: background, filter, threshold,
  * deblending, cleaning, photometry.  Linear in pixels plus detected pixels;
- * 4 bytes per pixel, 4 more with a weight map, plus 12 bytes
- * for each detected pixel while objects are being separated and 36 for those of
- * the component in hand.  A component larger than DETECT_MOST pixels and an
- * eighth of the image is not split and gets the flag DETECT_UNSEPARATED.
+ * 4 bytes per pixel, 4 more with a weight map, plus 12 bytes for each detected
+ * pixel and 14 for each run of them while objects are being separated, and up to
+ * 90 for the pixels of the component in hand: a component larger than DETECT_MOST
+ * pixels and a DETECT_PART of the image is not split, gets the flag
+ * DETECT_UNSEPARATED, and all stays below 32 MiB + 12 bytes per pixel and what the
+ * rows of the catalogue take (about 450 bytes each).
  */
 #ifndef PIXSHEAR_DETECT_H
 #define PIXSHEAR_DETECT_H
@@ -19,7 +21,7 @@
 
 struct progress;
 
-enum { DETECT_MOST = 1 << 20 };
+enum { DETECT_MOST = 1 << 18, DETECT_PART = 12 };
 
 enum weight_type { WEIGHT_INVERSE, WEIGHT_RMS, WEIGHT_VARIANCE };
 

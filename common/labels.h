@@ -10,21 +10,36 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Pixels x0 <= x < x1 of row y. */
+/* Pixels x0 <= x < x1 of a row; sides of images are below 2^16. */
 struct label_run {
-    int32_t y, x0, x1;
+    uint16_t x0, x1;
     int32_t label;             /* 1 + index of the object */
 };
 
 struct labels {
     long nx, ny;
     struct label_run *run;     /* row by row, x rising, no two overlap */
-    size_t *row;               /* ny + 1: where each row begins */
+    size_t *row;               /* ny + 1: where each row begins (and one more until labels_sort()) */
 };
 
-/* Take n runs, row by row, x rising, no two overlap, in memory from malloc(). E_NOMEM leaves *l and them alone. Linear time. */
-MUST_CHECK int labels_new(struct labels *l, long nx, long ny, struct label_run *run, size_t n);
+/*
+ * To fill: count every run, make room, put every run (in any order; no two overlap), sort.  Then they can be read.
+ * Linear time; beyond the runs themselves memory of one row.
+ */
+MUST_CHECK int labels_new(struct labels *l, long nx, long ny);
 void labels_free(struct labels *l);
+MUST_CHECK int labels_room(struct labels *l);
+MUST_CHECK int labels_sort(struct labels *l);
+
+static inline void labels_count(struct labels *l, long y)
+{
+    l->row[y + 2]++;
+}
+
+static inline void labels_put(struct labels *l, long y, long x0, long x1, int32_t label)
+{
+    l->run[l->row[y + 1]++] = (struct label_run){(uint16_t)x0, (uint16_t)x1, label};
+}
 
 /* The first run of row y that ends beyond x, or l->row[y + 1]. */
 static inline size_t labels_from(const struct labels *l, long y, long x)

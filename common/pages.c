@@ -31,6 +31,13 @@ void *pages_block(size_t bytes)
     return posix_memalign(&p, LARGE, bytes) ? NULL : p;
 }
 
+void pages_return(void)
+{
+#ifdef __GLIBC__
+    (void)malloc_trim(0);
+#endif
+}
+
 void pages_keep(size_t bytes)
 {
 #ifdef __GLIBC__

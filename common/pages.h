@@ -21,4 +21,7 @@ void *pages_block(size_t bytes);
  */
 void pages_keep(size_t bytes);
 
+/* What is free of it goes back now, for a program that needs its memory for another thing. */
+void pages_return(void);
+
 #endif

@@ -30,18 +30,19 @@ static struct box box_of(const struct run *first, const struct run *end)
 
 /* ---- two maxima, straight from the runs ---- */
 
-/* The runs of one row, [begin, end), and their values at x0 - left + 1 of a line that is 0 elsewhere. */
+/* The runs of one row, [begin, end), and their values at x0 - left + 1 of a line that is 0 elsewhere; rest: the values behind. */
 struct line {
     float *v;
     const struct run *begin, *end;
+    const float *rest;
 };
 
-static struct line take_line(const struct segments *s, const struct run *from, const struct run *stop, int32_t left, float *v)
+static struct line take_line(const float *value, const struct run *from, const struct run *stop, int32_t left, float *v)
 {
     const struct run *r = from;
-    for (; r < stop && r->y == from->y; r++)
-        memcpy(v + (r->x0 - left + 1), s->smooth + r->at, (size_t)(r->x1 - r->x0) * sizeof *v);
-    return (struct line){v, from, r};
+    for (; r < stop && r->y == from->y; value += r->x1 - r->x0, r++)
+        memcpy(v + (r->x0 - left + 1), value, (size_t)(r->x1 - r->x0) * sizeof *v);
+    return (struct line){v, from, r, value};
 }
 
 static void clear_line(struct line l, int32_t left)
@@ -72,10 +73,11 @@ static int several_maxima(const struct segments *s, size_t c, struct box box, st
     if (st)
         return st;
     memset(w->line, 0, 3 * wide * sizeof *w->line);
-    struct line up = {w->line, first, first}, here = take_line(s, first, end, (int32_t)box.x0, w->line + wide);
+    struct line up = {w->line, first, first, NULL};
+    struct line here = take_line(s->smooth + s->at[c], first, end, (int32_t)box.x0, w->line + wide);
     int n = 0;
     for (float *free_line = w->line + 2 * wide; here.begin < end && n < 2;) {
-        struct line down = take_line(s, here.end, end, (int32_t)box.x0, free_line);
+        struct line down = take_line(here.rest, here.end, end, (int32_t)box.x0, free_line);
         n += count_maxima(here, up.v, down.v, (int32_t)box.x0);
         clear_line(up, (int32_t)box.x0);
         free_line = up.v;
@@ -103,11 +105,12 @@ static int take_grid(const struct segments *s, size_t c, struct box box, struct 
         return st;
     *g = (struct grid){w->line, box.nx + 2, box.nx + 3, (box.nx + 2) * (box.ny + 1) - 2, 0};
     memset(g->v, 0, n * sizeof *g->v);
+    const float *v = s->smooth + s->at[c];
     for (size_t i = s->first[c]; i < s->first[c + 1]; i++) {
         const struct run *r = &s->run[i];
         float *to = g->v + (r->y - box.y0 + 1) * g->stride + (r->x0 - box.x0 + 1);
         for (int32_t x = 0; x < r->x1 - r->x0; x++) {
-            to[x] = s->smooth[r->at + (size_t)x];
+            to[x] = *v++;
             g->total += (double)to[x];
         }
     }

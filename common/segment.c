@@ -8,13 +8,14 @@
 #include "segment.h"
 #include "grow.h"
 #include "mend.h"
+#include "pages.h"
 #include "simd.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { STRIP = 128, BLOCK = 64 };
+enum { STRIP = 128, BLOCK = 64, RETURN = 1 << 19 };
 
 /* ---- filtered rows in order ---- */
 
@@ -173,7 +174,7 @@ struct stretches {
 struct strip {
     struct stretches s;
     uint32_t *parent;      /* of every run: the first one of its component inside the strip */
-    uint32_t *place;       /* the same memory later: of every run that stays its place among those of the image, else NOWHERE */
+    const uint32_t *place; /* of every run that stays the place of its pixels among those of the image, else NOWHERE; not owned */
 };
 
 static const uint32_t NOWHERE = UINT32_MAX;
@@ -202,7 +203,6 @@ static void strip_free(struct strip *s)
     free(s->s.run);
     free(s->s.pair);
     free(s->parent);
-    free(s->place);
     *s = (struct strip){0};
 }
 
@@ -538,7 +538,7 @@ static void join_strips(struct strip *strip, long n, uint32_t *parent, size_t nr
     for (long k = 0; k < n; k++) {
         for (size_t i = 0; i < strip[k].s.nrun; i++)
             parent[number + i] = number + strip[k].parent[i];
-        strip[k].place = strip[k].parent;
+        free(strip[k].parent);
         strip[k].parent = NULL;
         struct row here = border_row(&strip[k].s, 0, number);
         if (up.n && here.n && up.run->y + 1 == here.run->y)
@@ -548,14 +548,16 @@ static void join_strips(struct strip *strip, long n, uint32_t *parent, size_t nr
     }
     for (size_t i = 0; i < nrun; i++)
         parent[i] = parent[parent[i]];
+    if (nrun > RETURN)
+        pages_return();
 }
 
 /*
  * Number the components of at least min_area good pixels from 1, in order of their first runs, into number[] at these, 0
- * for the others; count their runs into first[c + 2]; at[c]: where their pixels begin.
+ * for the others; count the runs of number c into first[c + 1], their pixels into at[c + 1].
  */
 static int count_components(struct segments *s, const struct strip *strip, long n, const uint32_t *parent,
-                            uint32_t *number, size_t nrun, long min_area, size_t **at)
+                            uint32_t *number, size_t nrun, long min_area)
 {
     size_t i = 0, ncomp = 0;
     for (long k = 0; k < n; k++)
@@ -564,8 +566,8 @@ static int count_components(struct segments *s, const struct strip *strip, long 
     for (i = 0; i < nrun; i++)
         ncomp += number[i] >= (size_t)min_area;
     s->first = calloc(ncomp + 2, sizeof *s->first);
-    *at = calloc(ncomp + 1, sizeof **at);
-    if (!s->first || !*at)
+    s->at = calloc(ncomp + 2, sizeof *s->at);
+    if (!s->first || !s->at)
         return E_NOMEM;
     i = 0;
     for (long k = 0; k < n; k++)
@@ -578,31 +580,33 @@ static int count_components(struct segments *s, const struct strip *strip, long 
                 continue;
             s->first[c + 1]++;
             s->nrun++;
-            (*at)[c] += (size_t)(r->x1 - r->x0);
+            s->at[c + 1] += (size_t)(r->x1 - r->x0);
+            s->npix += (size_t)(r->x1 - r->x0);
         }
-    for (size_t c = 0; c < ncomp; c++)
-        (*at)[c + 1] += (*at)[c];
-    s->npix = (*at)[ncomp];
     return OK;
 }
 
-/* Every run that stays gets its place; at[c]: where the next pixels of component c go. */
-static void place_runs(struct segments *s, struct strip *strip, long n, const uint32_t *parent, const uint32_t *number, size_t *at)
+/* Every run that stays gets its place, and one for its pixels, which is put where its parent was: nobody asks for that again. */
+static void place_runs(struct segments *s, struct strip *strip, long n, uint32_t *parent, const uint32_t *number)
 {
-    size_t runs = 0, i = 0;
-    for (size_t c = 0; c < s->ncomponent; c++)
+    size_t i = 0;
+    for (size_t c = 0; c < s->ncomponent; c++) {       /* now number c begins at first[c] and at[c] */
         s->first[c + 2] += s->first[c + 1];
-    for (long k = 0; k < n; k++)
+        s->at[c + 2] += s->at[c + 1];
+    }
+    for (long k = 0; k < n; k++) {
+        strip[k].place = parent + i;
         for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
             const struct stretch *r = &strip[k].s.run[j];
             uint32_t c = number[parent[i]];
-            strip[k].place[j] = NOWHERE;
+            parent[i] = NOWHERE;
             if (!c)
                 continue;
-            s->run[s->first[c]] = (struct run){r->y, r->x0, r->x1, (int32_t)(c - 1), at[c - 1]};
-            at[c - 1] += (size_t)(r->x1 - r->x0);
-            strip[k].place[j] = s->order[runs++] = (uint32_t)s->first[c]++;
+            s->run[s->first[c]++] = (struct run){r->y, r->x0, r->x1};
+            parent[i] = (uint32_t)s->at[c];
+            s->at[c] += (size_t)(r->x1 - r->x0);
         }
+    }
 }
 
 struct moving {
@@ -620,14 +624,17 @@ static int move_pixels(void *ctx, long begin, long end, int worker)
         const float *pair = strip->s.pair;
         for (size_t j = 0; j < strip->s.nrun; j++) {
             size_t many = (size_t)(strip->s.run[j].x1 - strip->s.run[j].x0);
-            size_t to = strip->place[j] == NOWHERE ? 0 : m->s->run[strip->place[j]].at;
-            for (size_t x = 0; x < many && strip->place[j] != NOWHERE; x++) {
+            size_t to = strip->place[j];
+            for (size_t x = 0; x < many && to != NOWHERE; x++) {
                 m->s->smooth[to + x] = pair[2 * x];
                 m->s->value[to + x] = pair[2 * x + 1];
             }
             pair += 2 * many;
         }
+        size_t freed = 2 * strip->s.npix * sizeof *pair;
         strip_free(strip);
+        if (freed > RETURN)            /* a strip full of objects: what goes here is written anew there */
+            pages_return();
     }
     return OK;
 }
@@ -635,30 +642,30 @@ static int move_pixels(void *ctx, long begin, long end, int worker)
 /* The runs and pixels that stay, grouped by component; strips are freed on the way. */
 static int group_runs(struct segments *s, struct strip *strip, long n, long min_area, struct par_team *team)
 {
-    size_t nrun = 0, *at = NULL;
+    size_t nrun = 0;
     for (long k = 0; k < n; k++)
         nrun += strip[k].s.nrun;
     uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
     int st = parent && number ? OK : E_NOMEM;
     if (!st) {
         join_strips(strip, n, parent, nrun);
-        st = count_components(s, strip, n, parent, number, nrun, min_area, &at);
+        st = count_components(s, strip, n, parent, number, nrun, min_area);
     }
     if (!st) {
         s->run = malloc((s->nrun + 1) * sizeof *s->run);
-        s->order = malloc((s->nrun + 1) * sizeof *s->order);
         s->smooth = malloc((s->npix + 1) * sizeof *s->smooth);
         s->value = malloc((s->npix + 1) * sizeof *s->value);
-        st = s->run && s->order && s->smooth && s->value ? OK : E_NOMEM;
+        st = s->run && s->smooth && s->value ? OK : E_NOMEM;
     }
     if (!st) {
         struct moving m = {s, strip};
-        place_runs(s, strip, n, parent, number, at);
+        place_runs(s, strip, n, parent, number);
+        free(number);
+        number = NULL;
         st = par_team_for(team, n, 1, move_pixels, &m);
     }
     free(parent);
     free(number);
-    free(at);
     return st;
 }
 
@@ -688,9 +695,9 @@ int segment_find(struct segments *s, const struct image *im, const struct backgr
 void segment_free(struct segments *s)
 {
     free(s->run);
-    free(s->order);
     free(s->smooth);
     free(s->value);
     free(s->first);
+    free(s->at);
     *s = (struct segments){0};
 }

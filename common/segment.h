@@ -17,21 +17,19 @@
 #include "smooth.h"
 #include <stdint.h>
 
-/* Pixels x0 <= x < x1 of row y; their values start at `at`. */
+/* Pixels x0 <= x < x1 of row y; sides of images are below 2^16. */
 struct run {
-    int32_t y, x0, x1;
-    int32_t component;     /* index into first[] */
-    size_t at;
+    uint16_t y, x0, x1;
 };
 
 struct segments {
     size_t nrun, npix;
-    struct run *run;       /* grouped by component; inside one row by row, x rising, their values one after the other */
-    uint32_t *order;       /* indices into run[] of all runs in reading order */
-    float *smooth;         /* npix filtered values above background */
+    struct run *run;       /* grouped by component; inside one row by row, x rising */
+    float *smooth;         /* npix filtered values above background, in the order of the runs */
     float *value;          /* npix unfiltered values above background */
     size_t ncomponent;
-    size_t *first;         /* runs of component c: first[c] .. first[c+1]-1, in row order */
+    size_t *first;         /* runs of component c: first[c] .. first[c+1]-1 */
+    size_t *at;            /* its pixels, fewer than 2^32 in all: at[c] .. at[c+1]-1 */
 };
 
 struct segment_params {

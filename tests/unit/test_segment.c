@@ -70,15 +70,16 @@ static int compare(long nx, long ny, double threshold, long min_area, int nans, 
     for (size_t c = 0; good && c < s.ncomponent; c++) {
         long here = 0;
         of[c] = -1;
+        const float *value = s.value + s.at[c];
         for (size_t i = s.first[c]; i < s.first[c + 1]; i++)
             for (long x = s.run[i].x0; x < s.run[i].x1; x++) {
                 long at = s.run[i].y * nx + x;
-                good &= on[at] && (of[c] < 0 || label[at] == of[c]) && s.run[i].component == (int32_t)c;
-                good &= s.value[s.run[i].at + (size_t)(x - s.run[i].x0)] == im.pix[at];
+                good &= on[at] && (of[c] < 0 || label[at] == of[c]);
+                good &= *value++ == im.pix[at];
                 of[c] = label[at];
                 here++;
             }
-        good &= here == size[of[c]];
+        good &= here == size[of[c]] && value == s.value + s.at[c + 1];
         good &= c == 0 || of[c] > of[c - 1];     /* in the order of their first pixels */
         pixels += here;
     }
