@@ -101,6 +101,10 @@ static void decide(const struct work *w, struct plan *p)
         die(EXIT_RUN, "%s: BUNIT is not electron: noise is drawn from expected electrons", p->label);
     p->time = isnan(x->exptime) ? r->exptime : x->exptime;
     const double scale = isnan(x->scale) ? r->scale : x->scale;
+    if (fabs(r->exptime / x->exptime - 1) > 1e-9)
+        die(EXIT_RUN, "%s: EXPTIME is %g s: --exptime %g is for images without it: leave it out", p->label, x->exptime, r->exptime);
+    if (fabs(r->scale / x->scale - 1) > 1e-3)
+        die(EXIT_RUN, "%s: pixels of %g arcsec: --pixscale %g is for images that do not tell: leave it out", p->label, x->scale, r->scale);
     const int timed = !isnan(r->sky_mag) || !isnan(r->sky_rate) || !isnan(r->depth) || r->dark > 0;
     if (timed && isnan(p->time))
         die(EXIT_RUN, "%s: no keyword EXPTIME: give --exptime", p->label);
@@ -222,8 +226,13 @@ static void report(const struct noise_counts *n, const char *name)
         warn("%s: %ld pixels saturated", name, n->saturated);
 }
 
-static void check_options(const struct request *r)
+static void check_options(const struct request *r, const struct opt *own, const struct common *c)
 {
+    static const char *const point[] = {"psf", "psf-scale", NULL}, *const depth[] = {"depth-definition", NULL};
+    if (isnan(r->depth))
+        opt_idle(own, c, depth, "without --depth");
+    if (r->definition == DEPTH_AREA)
+        opt_idle(own, c, point, "without --depth-definition point5 or point10");
     if (!isnan(r->sky_mag) + !isnan(r->sky_rate) + !isnan(r->depth) > 1)
         die(EXIT_USAGE, "--sky, --sky-rate and --depth each set the sky: give one");
     if (r->definition != DEPTH_AREA && !r->psf)
@@ -303,7 +312,7 @@ int main(int argc, char **argv)
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    check_options(&r);
+    check_options(&r, own, &c);
     struct work w = {.r = &r, .c = &c, .name = c.argv[0]};
     struct err e;
     if (r.definition != DEPTH_AREA)

@@ -164,8 +164,11 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     if (wcs)
         f->sky = NULL;
     f->scale = o->pixscale > 0 ? o->pixscale : x.scale > 0 ? x.scale : 0;
+    const double here = x.scale;
     if (o->measure && exposure_keywords(flux, o->measure, &x, &e))
         die(EXIT_RUN, "%s", e.text);
+    if (fabs(x.scale / here - 1) > 1e-3)
+        die(EXIT_RUN, "%s: pixels of %g arcsec, but %s has %g: objects would be measured elsewhere", o->measure, x.scale, in, here);
     f->gain = opt_given(own, c, "gain") ? o->gain : x.gain > 0 ? x.gain : x.unit == UNIT_ELECTRON ? 1 : 0;
     f->has_gain = f->gain > 0 || opt_given(own, c, "gain");
     f->psf_fwhm = o->psf_fwhm > 0 ? o->psf_fwhm : header_double_or(flux, "PSFFWHM", header_double_or(h, "PSFFWHM", 0));
@@ -561,6 +564,16 @@ int main(int argc, char **argv)
         die(EXIT_USAGE, "--columns: there is no column '%s': see detect(1)", unknown);
     if (o.measure_weight && !o.measure)
         die(EXIT_USAGE, "--measure-weight %s: is the weight of another image: give --measure", o.measure_weight);
+    static const char *const of_weight[] = {"weight-type", NULL}, *const of_clean[] = {"clean-slope", NULL}, *const of_levels[] = {"deblend-contrast", NULL},
+                      *const of_objects[] = {"columns", "apertures", "flux-fraction", "format", "measure", NULL};
+    if (!o.weight && !o.measure_weight)
+        opt_idle(own, &c, of_weight, "without --weight");
+    if (o.no_clean)
+        opt_idle(own, &c, of_clean, "with --no-clean");
+    if (o.p.levels == 1)
+        opt_idle(own, &c, of_levels, "with --deblend-levels 1");
+    if (o.p.negative)
+        opt_idle(own, &c, of_objects, "with --negative, which prints a count");
     if (o.p.negative && o.region)
         die(EXIT_USAGE, "--negative and --region: only a count is written");
     if (o.p.negative)

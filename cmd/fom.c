@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static void check(int st, const char *what)
 {
@@ -41,6 +42,22 @@ static void parse_bins(struct bins *b, const char *text)
     if (n < 2)
         die(EXIT_USAGE, "--bins '%s': at least two edges", text);
     b->n = n - 1;
+}
+
+/* A catalogue given twice would count twice. */
+static void check_files(const struct common *c)
+{
+    struct stat *s = calloc((size_t)c->argc + 1, sizeof *s);
+    if (!s)
+        die(EXIT_RUN, "%s", err_text(E_NOMEM));
+    for (int i = 0; i < c->argc; i++) {
+        if (strcmp(c->argv[i], "-") == 0 || stat(c->argv[i], &s[i]))
+            continue;
+        for (int k = 0; k < i && S_ISREG(s[i].st_mode); k++)
+            if (s[k].st_ino == s[i].st_ino && s[k].st_dev == s[i].st_dev)
+                die(EXIT_USAGE, "%s: given twice (%s): it would count twice", c->argv[i], c->argv[k]);
+    }
+    free(s);
 }
 
 /* Read the catalogues block by block and keep what is needed. */
@@ -229,6 +246,7 @@ int main(int argc, char **argv)
     if (bin_text)
         parse_bins(&bins, bin_text);
     o.psf = against == 1;
+    check_files(&c);
     struct fom_image *im = read_all(&c, bin_text ? bins.key : NULL, o.psf);
     struct fom_result *r = calloc(n * (bins.n + 1) + 1, sizeof *r);
     if (!r)

@@ -532,11 +532,19 @@ int main(int argc, char **argv)
     if (!p.stars_only && !p.stars == !p.psf)
         die(EXIT_USAGE, "give one of --stars FILE, --psf FILE, --psf none");
 
+    static const char *const of_galaxies[] = {"stars", "psf", "fixed-width", "no-recenter", "centroid-term", "fourth", "psf-correction", "pixel", NULL},
+                      *const of_stars[] = {"max-stars", "star-average", NULL}, *const of_pixel[] = {"pixel", NULL};
+    split_stars(&p);
+    if (p.stars_only)
+        opt_idle(own, &c, of_galaxies, "with --stars-only");
+    else if (!p.star_image)
+        opt_idle(own, &c, of_stars, "unless stars are measured in this run");
+    if (!p.psf || strcmp(p.psf, "none") == 0)
+        opt_idle(own, &c, of_pixel, "without --psf FILE");
     if (p.region && (p.stars_only || outfile_same(p.region, c.out)))
         die(EXIT_USAGE, "--region %s: not with --stars-only, and not the output", p.region);
     if (p.plain && (p.stars_only || outfile_same(p.plain, c.out) || (p.region && outfile_same(p.plain, p.region))))
         die(EXIT_USAGE, "--plain %s: not with --stars-only, and not another output", p.plain);
-    split_stars(&p);
     one_standard_input(&p, &c);
     outputs_ready(&p, &c);
     outfile_together();

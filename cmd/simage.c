@@ -86,6 +86,9 @@ static void check_options(const struct request *r, const struct opt *own, const 
     for (int i = 0; i < 5; i++)
         if (needs[i] > 0 && !r->psf)
             die(EXIT_USAGE, "--%s needs a PSF: give -p FILE", name[i]);
+    static const char *const of_psf[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "psf-normalise", NULL};
+    if (!r->psf)
+        opt_idle(own, c, of_psf, "without --psf");
     if ((r->box[0] > 0 || r->edge[0] + r->edge[1] > 0) && r->no_pixel)
         die(EXIT_USAGE, "--pixel and --no-pixel: give one");
     for (int i = 0; i < 2; i++)

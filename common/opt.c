@@ -531,6 +531,13 @@ int opt_given(const struct opt *own, const struct common *c, const char *name)
     return o && (size_t)(o - own) < sizeof c->given && c->given[o - own];
 }
 
+void opt_idle(const struct opt *own, const struct common *c, const char *const *names, const char *why)
+{
+    for (; *names; names++)
+        if (opt_given(own, c, *names))
+            die(EXIT_USAGE, "--%s would do nothing %s: leave it out", *names, why);
+}
+
 /* ---- the HISTORY record ---- */
 
 /* Text that grows; open_memstream would lose text without a word when memory ends. */

@@ -84,6 +84,9 @@ void opt_output(const char *name, enum out_format format);
 /* 1 if the program's own option `name` was typed on the command line. */
 int opt_given(const struct opt *own, const struct common *c, const char *name);
 
+/* Exit 2 when one of the options of a list that ends with NULL was typed: it would do nothing, as `why` tells. */
+void opt_idle(const struct opt *own, const struct common *c, const char *const *names, const char *why);
+
 /*
  * The text for HISTORY: "name version: name --option value ... operands", all
  * options that differ from their defaults or were typed, without -j -v -q -o

@@ -4,7 +4,7 @@ cp true.fits clean.fits; cp noisy.fits field.fits; cp noisy.fits image.fits; cp 
 cp cat.txt image.cat; cp scat.txt stars.cat; cp shapes.txt image.shapes
 sed 's/^# Keyword: SETNAME.*//; s/^# Keyword: PIXSCALE/# Keyword: SETNAME = sim1\n&/' cut.txt >sim1-0.10-a.use
 galgen --field 12 --stars -n 25 -o stars.txt
-drizzle four.fits -o a.fits; drizzle four.fits -o b.fits; drizzle four.fits --flat -o grid.fits
+drizzle four.fits -o a.fits; addnoise -q -s 2 --depth 27 four.fits | drizzle - -o b.fits; drizzle four.fits --flat -o grid.fits
 mkdir made
 n=0
 for p in "$BIN"/*; do

@@ -1,0 +1,30 @@
+# Options that would do nothing beside others, and inputs that contradict a header or come twice, are refused: nothing is ignored without a word.
+small_chain
+idle() { # OPTION COMMAND...: exit 2, the option named; without it the command works (its last words are the option and its value)
+    local o=$1; shift
+    fails "${1} $o" 2 "$@" -o made
+    if grep -q -- "--$o would do nothing" cmd.err && [ ! -e made ]; then pass "told"; else fail "$1 $o: $(cat cmd.err)"; fi
+}
+idle psf-scale simage scene.txt --models models.txt -x 0.1 --psf-scale 3
+idle psf-cutoff simage scene.txt --models models.txt -x 0.1 --psf-cutoff 1
+idle psf addnoise true.fits --depth 27.7 --psf psf.fits
+idle psf-scale addnoise true.fits --depth 27.7 --psf-scale 0.1
+idle depth-definition addnoise true.fits --sky 22 --depth-definition area
+fails "addnoise: another EXPTIME than the header's" 1 addnoise -T 500 --depth 27 true.fits -o made
+fails "addnoise: another pixel than the header's" 1 addnoise -x 0.5 --depth 27 true.fits -o made
+ok "addnoise: the header's own values" addnoise -T 2000 -x 0.1 --depth 27 true.fits -o same.fits
+idle weight-type detect noisy.fits --weight-type rms
+idle clean-slope detect noisy.fits --no-clean --clean-slope 3
+idle deblend-contrast detect noisy.fits --deblend-levels 1 --deblend-contrast 0.1
+for o in columns=NUMBER apertures=1 flux-fraction=0.3 format=ldac measure=noisy.fits; do idle ${o%=*} detect noisy.fits --negative --$o; done
+perl -e 'local $/; $_ = <STDIN>; for (my $i = 0; $i < 5760; $i += 80) { my $k = substr($_, $i, 8); if ($k eq "PIXSCALE") { substr($_, $i, 80) = sprintf("%-80s", "PIXSCALE=                 0.05") }
+    if ($k =~ /^(CTYPE|CRVAL|CRPIX)/) { substr($_, $i, 1) = "X" } } print' <noisy.fits >fine.fits
+fails "detect: measured in an image of other pixels" 1 detect noisy.fits --measure fine.fits -o made
+for o in "psf none" "stars stars.rrg" "fixed-width 3" "fourth plain" "psf-correction first" "pixel 0.2" no-recenter centroid-term; do idle ${o%% *} rrgshape --stars-only stars.fits scat.txt --${o%% *} $([ "$o" = "${o#* }" ] || echo "${o#* }"); done
+idle max-stars rrgshape noisy.fits cat.txt --stars stars.rrg --max-stars 3
+idle star-average rrgshape noisy.fits cat.txt --psf none --star-average median
+idle pixel rrgshape noisy.fits cat.txt --stars stars.rrg --pixel 0.2
+idle pixel rrgshape noisy.fits cat.txt --psf none --pixel 0.2
+ln -s cut.txt link.txt
+fails "fom: a catalogue twice" 2 fom cut.txt cut.txt
+fails "fom: by another name" 2 fom cut.txt shapes.txt link.txt
