@@ -285,7 +285,7 @@ int sky_open(struct sky **out, const struct header *h, struct err *e)
     return st;
 }
 
-/* One part of at most PART positions, forward (pixel to sky) or back. */
+/* One part of at most PART positions, forward (pixel to sky) or back: OK, E_RANGE for one or more of them, E_NOMEM. */
 static int part(struct sky *s, int forward, size_t n, const double *a, const double *b, double *to_a,
                 double *to_b)
 {
@@ -302,6 +302,8 @@ static int part(struct sky *s, int forward, size_t n, const double *a, const dou
     int st = forward ? wcsp2s(&s->two, (int)n, 2, in, mid, phi, theta, out, stat)
                      : wcss2p(&s->two, (int)n, 2, in, phi, theta, mid, out, stat);
     int all = st && st != WCSERR_BAD_PIX && st != WCSERR_BAD_WORLD;
+    if (st == WCSERR_MEMORY)
+        return E_NOMEM;
     for (size_t i = 0; i < n; i++) {
         double u = out[2 * i + (forward ? (size_t)lng : 0)] - (forward ? 0 : 1);
         double v = out[2 * i + (forward ? (size_t)lat : 1)] - (forward ? 0 : 1);
@@ -310,18 +312,19 @@ static int part(struct sky *s, int forward, size_t n, const double *a, const dou
         to_a[i] = bad ? NAN : u;
         to_b[i] = bad ? NAN : v;
     }
-    return failures;
+    return failures ? E_RANGE : OK;
 }
 
 static int convert(struct sky *s, int forward, size_t n, const double *a, const double *b, double *to_a,
                    double *to_b)
 {
-    int failures = 0;
-    for (size_t at = 0; at < n; at += PART) {
+    int all = OK;
+    for (size_t at = 0; at < n && all != E_NOMEM; at += PART) {
         size_t k = n - at < PART ? n - at : PART;
-        failures |= part(s, forward, k, a + at, b + at, to_a + at, to_b + at) > 0;
+        int st = part(s, forward, k, a + at, b + at, to_a + at, to_b + at);
+        all = st ? st : all;
     }
-    return failures ? E_RANGE : OK;
+    return all;
 }
 
 int sky_from_pixel(struct sky *s, size_t n, const double *x, const double *y, double *ra, double *dec)

@@ -18,7 +18,7 @@ struct sky;
 MUST_CHECK int sky_open(struct sky **s, const struct header *h, struct err *e);
 void sky_close(struct sky *s);
 
-/* n positions; failures give NaN and the status E_RANGE after all were tried. */
+/* n positions; failures give NaN and the status E_RANGE after all were tried; E_NOMEM. */
 MUST_CHECK int sky_from_pixel(struct sky *s, size_t n, const double *x, const double *y,
                               double *ra, double *dec);
 MUST_CHECK int sky_to_pixel(struct sky *s, size_t n, const double *ra, const double *dec,
