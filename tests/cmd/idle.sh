@@ -20,7 +20,7 @@ for o in columns=NUMBER apertures=1 flux-fraction=0.3 format=ldac measure=noisy.
 perl -e 'local $/; $_ = <STDIN>; for (my $i = 0; $i < 5760; $i += 80) { my $k = substr($_, $i, 8); if ($k eq "PIXSCALE") { substr($_, $i, 80) = sprintf("%-80s", "PIXSCALE=                 0.05") }
     if ($k =~ /^(CTYPE|CRVAL|CRPIX)/) { substr($_, $i, 1) = "X" } } print' <noisy.fits >fine.fits
 fails "detect: measured in an image of other pixels" 1 detect noisy.fits --measure fine.fits -o made
-for o in "psf none" "stars stars.rrg" "fixed-width 3" "fourth plain" "psf-correction first" "pixel 0.2" no-recenter centroid-term; do idle ${o%% *} rrgshape --stars-only stars.fits scat.txt --${o%% *} $([ "$o" = "${o#* }" ] || echo "${o#* }"); done
+for o in psf=none stars=stars.rrg fixed-width=3 fourth=plain psf-correction=first pixel=0.2 no-recenter centroid-term; do idle "${o%=*}" rrgshape --stars-only stars.fits scat.txt "--$o"; done
 idle max-stars rrgshape noisy.fits cat.txt --stars stars.rrg --max-stars 3
 idle star-average rrgshape noisy.fits cat.txt --psf none --star-average median
 idle pixel rrgshape noisy.fits cat.txt --stars stars.rrg --pixel 0.2
