@@ -98,6 +98,14 @@ near "the others stay" "$(detect f.fits -w w.fits | awk '!/^#/ && $20 < 32' | wc
 mk 160 160 '20' >rms.fits
 near "rms map of 20: the same objects" "$(detect f.fits -w rms.fits --weight-type rms | grep -vc '^#')" 5 0
 near "rms map of 20000: none" "$(detect f.fits -w <(mk 160 160 20000) --weight-type rms | grep -vc '^#')" 0 0
+mk 160 160 'x < 110 ? 4 : 1' >var.fits
+mk 160 160 'x < 110 ? 1 : 4' >inv.fits
+detect f.fits -w var.fits --weight-type variance -o var.cat; detect f.fits -w inv.fits -o inv.cat
+same "relative variances of 4 and 1 are weights of 1 and 4" <(grep -v '^#' var.cat) <(grep -v '^#' inv.cat)
+near "twice the noise where the variance is four times that of the rest" "$(awk "BEGIN { print $(row var.cat 40.3 50.6 BACKRMS) / $(row var.cat 120.7 30.2 BACKRMS) }")" 2 0.001
+mk 160 160 '(x > 35 && x < 46 && y > 40 && y < 60) ? 0 : 9' >var.fits
+near "variance 0 is no weight: an object is hidden" "$(detect f.fits -w var.fits --weight-type variance | awk '!/^#/ && ($2 - 40.3)^2 + ($3 - 50.6)^2 < 9 && $20 < 32' | wc -l)" 0 0
+near "and the others stay" "$(detect f.fits -w var.fits --weight-type variance | awk '!/^#/ && $20 < 32' | wc -l)" 4 0
 mk 80 160 1 >small.fits
 fails "a weight map of another size" 1 detect f.fits -w small.fits
 

@@ -133,3 +133,14 @@ for n in 750 3000; do
     eval "t$n=$(cat time.txt)"
 done
 between "16 times as many: processor time over 16 times the time" "$(awk "BEGIN { t = $t750 > 0.02 ? $t750 : 0.02; print $t3000 / 16 / t }")" 0.02 2
+# progress: on a terminal after half a second, gone at the end; never into a file, never with -q
+if command -v script >/dev/null; then
+    slow="-k 0 --min-area 1 --rms 3 --columns $ALL --apertures 0.3,1 dots.fits -o bar.cat.fits"
+    script -qec "detect $slow" /dev/null </dev/null >bar.txt 2>&1
+    near "progress on a terminal: rising" "$(tr '\r' '\n' <bar.txt | sed -n 's/^detect \[#* *\] *\([0-9]*\)%.*/\1/p' | awk 'NR == 1 { a = $1 } $1 < last { bad = 1 } { last = $1 } END { print (NR > 1 && last > a && last <= 100 && !bad) + 0 }')" 1 0
+    near "and wiped out at the end" "$(tail -c 6 bar.txt | LC_ALL=C tr -dc '\r\033K[' | od -An -tx1 | tr -d ' \n' | grep -c '0d1b5b4b$')" 1 0
+    script -qec "detect -q $slow" /dev/null </dev/null >bar.txt 2>&1
+    near "none with -q" "$(wc -c <bar.txt)" 0 0
+    detect $slow 2>bar.txt
+    near "none into a file" "$(grep -c '%' bar.txt)" 0 0
+else skip "script is not there: progress on a terminal is not tested"; fi
