@@ -15,6 +15,7 @@
 #include "models.h"
 #include "opt.h"
 #include "outfile.h"
+#include "pages.h"
 #include "plan.h"
 #include "progress.h"
 #include "psf.h"
@@ -531,6 +532,7 @@ int main(int argc, char **argv)
         {"psf-normalise", 0, OPT_FLAG, &r.psf_options.normalise, 0, 0, 0, "divide the PSF by its sum", 0, 0},
         {0}
     };
+    pages_give_back();
     opt_parse(&prog, own, &c, argc, argv);
     check_options(&r, own, &c);
     if (r.wcs && !opt_given(own, &c, "center"))

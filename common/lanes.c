@@ -362,41 +362,47 @@ WIDE static void scatter(int h, const double *even, const double *odd, int rows,
     }
 }
 
-/* Both passes; rows of the image `stride` doubles apart. */
-static void run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out, size_t stride)
+/* What `scratch` holds: two signals of n or rows elements, then for eight rows h + 1 columns (x) and the half-length sequence (z). */
+struct scratch {
+    struct signal a, b, x, z;
+};
+
+static struct scratch scratch_of(const struct lanes *p, double *mem)
 {
-    const int n = p->n, h = n / 2;
-    const size_t size = LANES * (size_t)(n > p->rows ? n : p->rows);
+    const size_t size = LANES * (size_t)(p->n > p->rows ? p->n : p->rows), h = (size_t)p->n / 2;
+    const size_t xs = LANES * (h + LANES), zs = LANES * h;
+    double *x = mem + 4 * size, *z = x + 2 * xs;
+    return (struct scratch){{mem, mem + size, LANES}, {mem + 2 * size, mem + 3 * size, LANES}, {x, x + xs, LANES}, {z, z + zs, LANES}};
+}
+
+void lanes_columns(const struct lanes *p, int k, double *re, double *im, int ld, double *scratch)
+{
+    const struct scratch s = scratch_of(p, scratch);
+    const struct signal column = {re + k, im + k, (size_t)ld};
+    sequence_run(&p->column, &column, &column, &s.a, &s.b);
+}
+
+void lanes_rows(const struct lanes *p, int y, int m, const double *re, const double *im, int ld, double *scratch, double *out, size_t stride)
+{
+    const struct scratch s = scratch_of(p, scratch);
+    const int n = p->n, h = n / 2, rows = p->rows - y < LANES ? p->rows - y : LANES;
     m = m > h + 1 ? h + 1 : m;
-    const struct signal a = {scratch, scratch + size, LANES}, b = {scratch + 2 * size, scratch + 3 * size, LANES};
-    for (int k = 0; k < m; k += LANES) {
-        const struct signal column = {re + k, im + k, (size_t)ld};
-        sequence_run(&p->column, &column, &column, &a, &b);
+    gather(re + (size_t)y * (size_t)ld, (size_t)ld, rows - 1, m, s.x.re);
+    gather(im + (size_t)y * (size_t)ld, (size_t)ld, rows - 1, m, s.x.im);
+    for (int k = m; k <= h; k++) {
+        memset(s.x.re + (size_t)k * LANES, 0, LANES * sizeof *s.x.re);
+        memset(s.x.im + (size_t)k * LANES, 0, LANES * sizeof *s.x.im);
     }
-    /* x: h + 1 columns of eight rows, z: h */
-    const size_t xs = LANES * ((size_t)h + LANES), zs = LANES * (size_t)h;
-    double *x_re = scratch + 4 * size, *x_im = x_re + xs;
-    const struct signal z = {x_im + xs, x_im + xs + zs, LANES};
-    for (int y = 0; y < p->rows; y += LANES) {
-        const int rows = p->rows - y < LANES ? p->rows - y : LANES;
-        gather(re + (size_t)y * (size_t)ld, (size_t)ld, rows - 1, m, x_re);
-        gather(im + (size_t)y * (size_t)ld, (size_t)ld, rows - 1, m, x_im);
-        for (int k = m; k <= h; k++) {
-            memset(x_re + (size_t)k * LANES, 0, LANES * sizeof *x_re);
-            memset(x_im + (size_t)k * LANES, 0, LANES * sizeof *x_im);
-        }
-        half_length(h, p->c, p->s, x_re, x_im, z.re, z.im);
-        sequence_run(&p->row, &z, &z, &a, &b);
-        scatter(h, z.re, z.im, rows, n, stride, out + (size_t)y * stride);
-    }
+    half_length(h, p->c, p->s, s.x.re, s.x.im, s.z.re, s.z.im);
+    sequence_run(&p->row, &s.z, &s.z, &s.a, &s.b);
+    scatter(h, s.z.re, s.z.im, rows, n, stride, out);
 }
 
 void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out)
 {
-    run(p, m, re, im, ld, scratch, out, (size_t)p->n);
-}
-
-void lanes_run_in_place(const struct lanes *p, int m, double *plane, int half, int stride, double *scratch)
-{
-    run(p, m, plane, plane + half, stride, scratch, plane, (size_t)stride);
+    m = m > p->n / 2 + 1 ? p->n / 2 + 1 : m;
+    for (int k = 0; k < m; k += LANES)
+        lanes_columns(p, k, re, im, ld, scratch);
+    for (int y = 0; y < p->rows; y += LANES)
+        lanes_rows(p, y, m, re, im, ld, scratch, out + (size_t)y * (size_t)p->n, (size_t)p->n);
 }

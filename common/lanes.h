@@ -33,9 +33,11 @@ size_t lanes_scratch(const struct lanes *p);
 void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out);
 
 /*
- * In place: row y of the frequencies has its real parts at plane + y stride and its imaginary parts `half`
- * doubles on, half >= n/2 + 1 and a multiple of 8, stride >= 2 half; row y of the image takes their place.
+ * Its two passes in shares, which threads may do side by side: all columns before any row.  Transforms columns
+ * k .. k + 7 (k a multiple of 8, k < m) in place, or makes rows y .. y + 7 (those that there are), `stride` doubles apart; out, which
+ * gets row y, may be re + y ld when im lies within its rows: each row of the image takes the place of its frequencies.
  */
-void lanes_run_in_place(const struct lanes *p, int m, double *plane, int half, int stride, double *scratch);
+void lanes_columns(const struct lanes *p, int k, double *re, double *im, int ld, double *scratch);
+void lanes_rows(const struct lanes *p, int y, int m, const double *re, const double *im, int ld, double *scratch, double *out, size_t stride);
 
 #endif

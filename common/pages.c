@@ -7,7 +7,7 @@
 #include <malloc.h>
 #endif
 
-enum { LARGE = 2 << 20, MAPPED = 4 << 20, FIRST = 16 << 20, STEP = 1 << 20, KEPT = 1 << 30 };
+enum { CACHE_LINE = 64, SMALL = 128 << 10, LARGE = 2 << 20, MAPPED = 4 << 20, FIRST = 16 << 20, STEP = 1 << 20, KEPT = 1 << 30 };
 
 void pages_large(void *p, size_t bytes)
 {
@@ -26,9 +26,14 @@ void pages_large(void *p, size_t bytes)
 void *pages_block(size_t bytes)
 {
     void *p;
-    if (bytes < 2 * (size_t)LARGE)
-        return malloc(bytes);
-    return posix_memalign(&p, LARGE, bytes) ? NULL : p;
+    return posix_memalign(&p, bytes < 2 * (size_t)LARGE ? CACHE_LINE : LARGE, bytes) ? NULL : p;
+}
+
+void pages_give_back(void)
+{
+#ifdef __GLIBC__
+    (void)mallopt(M_MMAP_THRESHOLD, SMALL);      /* without this the threshold follows the largest block freed */
+#endif
 }
 
 void pages_return(void)

@@ -12,7 +12,7 @@
 /* Advise large pages for `bytes` at p, not touched yet; a hint that never fails.  Blocks below 4 MiB are left alone. */
 void pages_large(void *p, size_t bytes);
 
-/* malloc(); from 4 MiB on the block begins where a large page can begin. */
+/* malloc(), at a multiple of 64 bytes; from 4 MiB on the block begins where a large page can begin. */
 void *pages_block(size_t bytes);
 
 /*
@@ -23,5 +23,8 @@ void pages_keep(size_t bytes);
 
 /* What is free of it goes back now, for a program that needs its memory for another thing. */
 void pages_return(void);
+
+/* The other way: blocks of 128 KiB and more go back to the system as soon as they are freed, however many came before. */
+void pages_give_back(void);
 
 #endif

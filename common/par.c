@@ -7,7 +7,10 @@
 #include "par.h"
 #include <pthread.h>
 #include <sched.h>
+#include <stdatomic.h>
 #include <stdlib.h>
+
+#define LOOKS 200         /* of who waits in a crew, giving way to others between them, before it sleeps */
 
 /* ---- processors ---- */
 
@@ -397,4 +400,77 @@ void par_turns_free(struct par_turns *t)
     pthread_cond_destroy(&t->moved);
     pthread_mutex_destroy(&t->lock);
     free(t);
+}
+
+/* ---- crews ---- */
+
+struct par_crew {
+    int threads;
+    atomic_long next;         /* item of this stage */
+    atomic_int here;          /* have come to the meeting */
+    atomic_uint stage;        /* meetings that are over */
+    atomic_int failure;       /* of this stage, so far */
+    int status;               /* of the last meeting; written before `stage` moves */
+    pthread_mutex_t lock;
+    pthread_cond_t over;
+};
+
+struct par_crew *par_crew_new(int threads)
+{
+    struct par_crew *c = threads > 0 ? calloc(1, sizeof *c) : NULL;
+    if (!c)
+        return NULL;
+    c->threads = threads;
+    if (pthread_mutex_init(&c->lock, NULL) || pthread_cond_init(&c->over, NULL)) {
+        free(c);
+        return NULL;
+    }
+    return c;
+}
+
+long par_crew_take(struct par_crew *c)
+{
+    return atomic_fetch_add_explicit(&c->next, 1, memory_order_relaxed);
+}
+
+/* Until meeting number `stage` is over. */
+static void crew_wait(struct par_crew *c, unsigned stage)
+{
+    for (int look = 0; look < LOOKS; look++) {
+        if (atomic_load_explicit(&c->stage, memory_order_acquire) != stage)
+            return;
+        sched_yield();
+    }
+    pthread_mutex_lock(&c->lock);
+    while (atomic_load_explicit(&c->stage, memory_order_acquire) == stage)
+        pthread_cond_wait(&c->over, &c->lock);
+    pthread_mutex_unlock(&c->lock);
+}
+
+int par_crew_meet(struct par_crew *c, int status)
+{
+    const unsigned stage = atomic_load(&c->stage);
+    if (status)
+        atomic_store(&c->failure, status);
+    if (atomic_fetch_add(&c->here, 1) + 1 < c->threads) {
+        crew_wait(c, stage);
+        return c->status;
+    }
+    c->status = atomic_load(&c->failure);      /* the last to come: nobody else moves */
+    atomic_store(&c->here, 0);
+    atomic_store(&c->next, 0);
+    pthread_mutex_lock(&c->lock);
+    atomic_store(&c->stage, stage + 1);
+    pthread_cond_broadcast(&c->over);
+    pthread_mutex_unlock(&c->lock);
+    return c->status;
+}
+
+void par_crew_free(struct par_crew *c)
+{
+    if (!c)
+        return;
+    pthread_cond_destroy(&c->over);
+    pthread_mutex_destroy(&c->lock);
+    free(c);
 }

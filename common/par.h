@@ -52,4 +52,14 @@ void par_turn_end(struct par_turns *t, int place);
 void par_turns_fail(struct par_turns *t, int status);            /* nobody waits any longer */
 void par_turns_free(struct par_turns *t);
 
+/*
+ * A crew: exactly `threads` threads that go through stages together.  They take the items of a stage one by one, in any order, and meet at
+ * its end: nobody goes on before all have come.  Who waits looks for some 50 us before it sleeps, so stages may be as short as that.
+ */
+struct par_crew;
+struct par_crew *par_crew_new(int threads);                      /* NULL: no memory */
+long par_crew_take(struct par_crew *c);                          /* 0, 1, 2 ... of this stage, without end */
+MUST_CHECK int par_crew_meet(struct par_crew *c, int status);    /* OK when all came with OK, else one of their failures, the same for all */
+void par_crew_free(struct par_crew *c);
+
 #endif

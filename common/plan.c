@@ -20,7 +20,7 @@
 #define BROAD_KMAX 16000       /* frequencies per axis of a large object */
 
 #define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
-#define PART_PIXELS 1048576    /* larger stamps are made in parts */
+#define PART_PIXELS 2097152    /* larger stamps are made in parts */
 #define PIXEL_COST 3.5e-9        /* seconds to sum, convert and write a pixel of the image */
 #define LONGEST 10.0           /* seconds for one object without a stamp; those that need more are not drawn */
 #define BROAD_X 0.5e-9         /* seconds for one frequency of a large object in one column of the image */

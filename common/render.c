@@ -3,6 +3,7 @@
 #include "fft.h"
 #include "par.h"
 #include "simd.h"
+#include "tall.h"
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,51 +12,45 @@
 #define CHUNK_PIXELS 16384     /* doubles of a chunk of stamps: with HELD of them 512 KiB, half a core's cache */
 #define SPACE_PIXELS 1310720   /* doubles that all threads may hold together, and a chunk more each: 10 MiB */
 #define WINDOW_PIXELS 1048576  /* doubles of the window, at most */
-#define PART_PIXELS 1048576    /* pixels, about, of one part of a stamp without a PSF */
+#define PART_PIXELS 131072     /* pixels, about, of one part of a stamp without a PSF */
+#define BROAD_PIXELS 1048576   /* and of an object larger than stamps: each part costs its frequencies again */
 #define PAGE_FLOATS 1024       /* in the smallest page of memory */
 #define STRIPS 8               /* of columns of the image, in each of which one thread adds */
-#define TALL 200               /* rows; taller stamps, always few, are added to the image itself */
+#define TALL 200               /* rows; taller stamps without a PSF, always few, are added to the image itself */
 
-/* Objects to draw: huge pieces first, then tall stamps, then in order of their first row in the image, then of their number. */
+/* Objects to draw: tall stamps first, then in order of their first row in the image, then of their number. */
 struct entry {
-    int row;                       /* -1: tall, -2: tall and huge */
+    int row;                       /* -1: tall */
     int part;
     unsigned int index;
 };
 
-/* Rows of a stamp that are made together: first, first + step, ... (`rows` of them), `stride` doubles apart. */
+/* Rows of a stamp that are made together. */
 struct piece {
-    int first, step, rows;
-    size_t stride;
+    int first, rows;
 };
 
-/* Large stamps come in parts, so that memory does not grow with them. */
-static int parts_of(const struct plan *p, const struct draw *d, int tall)
+static int part_rows(const struct draw *d)
 {
-    if (!tall || d->nx < 1)
-        return 1;
-    if (d->path == PATH_FOURIER)
-        return p->grid[d->grid].parts;
-    const int rows = PART_PIXELS / d->nx < 1 ? 1 : PART_PIXELS / d->nx;
-    return (d->ny + rows - 1) / rows;
+    const int pixels = d->path == PATH_BROAD ? BROAD_PIXELS : PART_PIXELS;
+    return pixels / d->nx < 1 ? 1 : pixels / d->nx;
+}
+
+/* Large stamps come in parts, so that memory does not grow with them. */
+static int parts_of(const struct draw *d, int tall)
+{
+    return tall ? (d->ny + part_rows(d) - 1) / part_rows(d) : 1;
 }
 
 static struct piece piece_of(const struct plan *p, const struct entry *e)
 {
     const struct draw *d = &p->draw[e->index];
-    struct piece q = {0, 1, d->ny, (size_t)d->nx};
     if (e->row >= 0)
-        return q;
-    const int parts = parts_of(p, d, 1);
-    if (d->path == PATH_FOURIER)
-        return (struct piece){e->part, parts, d->ny / parts, stamp_stride(d->nx)};
-    const int rows = PART_PIXELS / d->nx < 1 ? 1 : PART_PIXELS / d->nx;
-    q.first = e->part * rows;
-    q.rows = d->ny - q.first < rows ? d->ny - q.first : rows;
-    return q;
+        return (struct piece){0, d->ny};
+    const int rows = part_rows(d), first = e->part * rows;
+    return (struct piece){first, d->ny - first < rows ? d->ny - first : rows};
 }
 
-/* Draw one piece; a tall Fourier stamp in place, with its stride. */
 static int draw_piece(const struct plan *p, const struct entry *e, struct stamp_work *w, double *scratch, double *out)
 {
     const size_t i = e->index;
@@ -77,8 +72,6 @@ static int draw_piece(const struct plan *p, const struct entry *e, struct stamp_
     case PATH_MAPPED:
         return stamp_mapped(w, &shape, v->pixel, box, d->nx, q.rows, x, y - q.first, s->flux, out);
     case PATH_FOURIER:
-        if (e->row < 0)
-            return stamp_fourier_part(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, q.first, out);
         return stamp_fourier(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, out);
     case PATH_BROAD:
         return stamp_broad(&p->grid[d->grid], w, &shape, v->pixel, d->nx, q.rows, x, y - q.first, s->flux, d->kcut, out);
@@ -88,23 +81,31 @@ static int draw_piece(const struct plan *p, const struct entry *e, struct stamp_
     return E_RANGE;
 }
 
-int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
+/* A Fourier stamp that comes in interlaced parts. */
+static int stamp_of_parts(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
 {
     const struct draw *d = &p->draw[i];
-    struct entry e = {0, 0, (unsigned int)i};
-    const int parts = d->path == PATH_FOURIER ? p->grid[d->grid].parts : 1;
-    if (parts == 1)
-        return draw_piece(p, &e, w, scratch, out);
-    const size_t stride = stamp_stride(d->nx), n = (size_t)d->nx, rows = n / (size_t)parts;
+    const struct emitter *s = &p->emitter[i];
+    const struct stamp_grid *g = &p->grid[d->grid];
+    const size_t stride = stamp_stride(d->nx), n = (size_t)d->nx, parts = (size_t)g->parts, rows = n / parts;
     double *plane = fft_alloc(rows * stride * sizeof *plane);
-    int st = plane ? OK : E_NOMEM;
-    for (e.row = -1; e.part < parts && st == OK; e.part++) {
-        st = draw_piece(p, &e, w, scratch, plane);
+    struct shape shape;
+    int st = plane ? plan_shape(p, i, scratch, &shape) : E_NOMEM;
+    for (size_t part = 0; part < parts && st == OK; part++) {
+        st = stamp_fourier_part(g, w, &shape, s->x - d->x0, s->y - d->y0, s->flux, d->kcut, (int)part, plane);
         for (size_t k = 0; k < rows && st == OK; k++)
-            memcpy(out + ((size_t)e.part + k * (size_t)parts) * n, plane + k * stride, n * sizeof *out);
+            memcpy(out + (part + k * parts) * n, plane + k * stride, n * sizeof *out);
     }
     fft_free(plane);
     return st;
+}
+
+int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out)
+{
+    const struct draw *d = &p->draw[i];
+    if (d->path == PATH_FOURIER && p->grid[d->grid].parts > 1)
+        return stamp_of_parts(p, i, w, scratch, out);
+    return draw_piece(p, &(struct entry){0, 0, (unsigned int)i}, w, scratch, out);
 }
 
 static int by_row(const void *a, const void *b)
@@ -176,8 +177,8 @@ static void strip_add(struct window *w, int strip, const struct draw *d, const s
     if (!tall)
         window_move(w, strip, d->y0 < 0 ? 0 : d->y0);
     for (int k = 0; k < q->rows; k++) {
-        const long y = d->y0 + (long)q->first + (long)k * q->step;
-        const double *from = stamp + (size_t)k * q->stride + (x0 - d->x0);
+        const long y = d->y0 + (long)q->first + k;
+        const double *from = stamp + (size_t)k * (size_t)d->nx + (x0 - d->x0);
         if (y < 0 || y >= w->im->ny)
             continue;
         if (tall)
@@ -190,7 +191,7 @@ static void strip_add(struct window *w, int strip, const struct draw *d, const s
 static size_t doubles_of(const struct plan *p, const struct entry *e)
 {
     const struct piece q = piece_of(p, e);
-    return ((size_t)q.rows * q.stride + 7) / 8 * 8;
+    return ((size_t)q.rows * (size_t)p->draw[e->index].nx + 7) / 8 * 8;
 }
 
 /*
@@ -253,9 +254,9 @@ static int chunk_add(const struct job *j, struct worker *w)
 static int draw_and_add(void *ctx, long begin, long end, int worker)
 {
     const struct job *j = ctx;
-    struct worker *w = &j->worker[worker];
-    (void)begin;
+    struct worker *w = &j->worker[begin];
     (void)end;
+    (void)worker;
     for (;;) {
         const long chunk = par_turn_take(j->turns);
         int st = chunk < 0 ? OK : chunk_draw(j, w, chunk);
@@ -322,7 +323,7 @@ static void workers_free(struct worker *w, int threads)
 }
 
 /* What the entries of one pass need. */
-enum { PASSES = 3 };
+enum { PASSES = 2 };
 
 struct pass {
     size_t n;
@@ -330,31 +331,35 @@ struct pass {
     size_t largest;        /* doubles of the largest piece */
 };
 
-/* Stamps that go to the image itself: those of many rows, of more than a window holds, or of many pixels. */
+/* Stamps that go to the image itself: those of many rows, of more than a window holds, or of many pixels; without a PSF. */
 static int is_tall(const struct plan *p, const struct draw *d)
 {
-    return d->ny > TALL || (d->ny > 16 && (long)d->ny * p->view.nx > WINDOW_PIXELS) || (size_t)d->nx * (size_t)d->ny > PART_PIXELS;
+    return d->ny > TALL || (d->ny > 16 && (long)d->ny * p->view.nx > WINDOW_PIXELS) || (size_t)d->nx * (size_t)d->ny > WINDOW_PIXELS;
 }
 
-/* Entries in drawing order: pass 0 of huge pieces, of which one is held at a time, pass 1 of other tall stamps, pass 2 of the rest. */
+/* Drawn here, not in tall.c. */
+static int is_entry(const struct plan *p, const struct draw *d)
+{
+    return d->path != PATH_NONE && !tall_is(p, d);
+}
+
+/* Entries in drawing order: pass 0 of tall stamps, pass 1 of the rest. */
 static void order(const struct plan *p, struct entry *e, struct pass pass[PASSES])
 {
     size_t n = 0;
     for (size_t i = 0; i < p->n; i++) {
         const struct draw *d = &p->draw[i];
-        if (d->path == PATH_NONE)
+        if (!is_entry(p, d))
             continue;
-        const int tall = is_tall(p, d), parts = parts_of(p, d, tall);
+        const int tall = is_tall(p, d), parts = parts_of(d, tall);
+        struct pass *q = &pass[!tall];
         for (int k = 0; k < parts; k++, n++) {
             e[n] = (struct entry){tall ? -1 : d->y0 < 0 ? 0 : d->y0, k, (unsigned int)i};
             const size_t need = doubles_of(p, &e[n]);
-            if (tall && need > SPACE_PIXELS / 2)
-                e[n].row = -2;
-            struct pass *q = &pass[e[n].row < 0 ? e[n].row + 2 : 2];
-            q->n++;
             q->largest = need > q->largest ? need : q->largest;
-            q->tallest = !tall && d->ny > q->tallest ? d->ny : q->tallest;
         }
+        q->n += (size_t)parts;
+        q->tallest = !tall && d->ny > q->tallest ? d->ny : q->tallest;
     }
     qsort(e, n, sizeof *e, by_row);
 }
@@ -364,28 +369,29 @@ static size_t entries(const struct plan *p)
 {
     size_t n = 0;
     for (size_t i = 0; i < p->n; i++)
-        if (p->draw[i].path != PATH_NONE)
-            n += (size_t)parts_of(p, &p->draw[i], is_tall(p, &p->draw[i]));
+        if (is_entry(p, &p->draw[i]))
+            n += (size_t)parts_of(&p->draw[i], is_tall(p, &p->draw[i]));
     return n;
 }
 
 /* All chunks of one pass on the threads. */
-static int run(struct job *j, long chunks, int threads)
+static int run(struct job *j, long chunks, int threads, struct par_team *team)
 {
     j->turns = par_turns_new(STRIPS, chunks);
     if (!j->turns)
         return E_NOMEM;
-    int st = par_for(threads, 1, threads, draw_and_add, j);
+    int st = par_team_for(team, threads, 1, draw_and_add, j);
     par_turns_free(j->turns);
     return st;
 }
 
 /* One pass has its own memory: that of tall stamps is given back before the window is made. */
-static int render_pass(const struct plan *p, const struct pass *q, const struct entry *e, struct image *im, int threads,
+static int render_pass(const struct plan *p, const struct pass *q, const struct entry *e, struct image *im, struct par_team *team,
                        struct progress *bar)
 {
     if (q->n == 0)
         return OK;
+    int threads = par_team_size(team);
     struct window w = {.im = im, .height = q->tallest > im->ny ? (int)im->ny : q->tallest};
     const size_t space = (q->largest > CHUNK_PIXELS ? q->largest : CHUNK_PIXELS) + 8, most = (SPACE_PIXELS + (size_t)threads * CHUNK_PIXELS) / space;
     int hold = most / (size_t)threads > HELD ? HELD : (int)(most / (size_t)threads);
@@ -402,7 +408,7 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
     int st = first && workers && (w.row || !q->tallest) ? workers_new(workers, threads, plan_scratch(p), space, hold) : E_NOMEM;
     if (st == OK) {
         struct job job = {.p = p, .entry = e, .first = first, .w = &w, .worker = workers, .hold = hold, .bar = bar};
-        st = run(&job, cut_chunks(p, e, q->n, first), threads);
+        st = run(&job, cut_chunks(p, e, q->n, first), threads, team);
     }
     for (int strip = 0; st == OK && w.row && strip < STRIPS; strip++)
         window_move(&w, strip, im->ny);
@@ -418,12 +424,17 @@ int scene_render(const struct plan *p, struct image *im, int threads, struct pro
         return E_RANGE;
     struct pass pass[PASSES] = {{0}};
     struct entry *e = malloc((entries(p) + 1) * sizeof *e), *from = e;
-    if (!e)
-        return E_NOMEM;
-    order(p, e, pass);
-    int st = threads > 1 ? par_for(im->ny, 1 + im->ny / 16, threads, touch_rows, im) : OK;
+    struct par_team *team = par_team_new(threads);
+    int st = e ? OK : E_NOMEM;
+    if (st == OK && team)
+        st = par_team_for(team, im->ny, 1 + im->ny / 16, touch_rows, im);
+    if (st == OK)
+        st = tall_render(p, im, team, bar);
+    if (st == OK)
+        order(p, e, pass);
     for (int k = 0; k < PASSES && st == OK; from += pass[k++].n)
-        st = render_pass(p, &pass[k], from, im, threads, bar);
+        st = render_pass(p, &pass[k], from, im, team, bar);
+    par_team_free(team);
     free(e);
     return st;
 }

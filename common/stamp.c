@@ -22,11 +22,56 @@
 /* Eight doubles; the compiler splits them to what the processor has. Loads need no alignment. */
 typedef double v8 __attribute__((vector_size(64), aligned(8)));
 
+/* One row of the transform at +u_y (p) and -u_y (m): columns 0..m-1. */
+struct row {
+    double *p_re, *p_im, *m_re, *m_im;
+};
+
+/* Everything the rows of one object need and no row changes. */
+struct transform {
+    const struct stamp_grid *g;
+    const struct shape *s;
+    int nmax, ld;              /* ld: columns, a multiple of 8 */
+    double *phi;               /* (nmax+1) x ld basis at u_x >= 0 */
+    double *phi_y;             /* the same along y (phi itself when the axes are alike) */
+    double *ve, *vo;           /* (nmax+1) x ld sums over even and odd n1, for each n2 */
+    double *coef;              /* coefficients with the factors (-i)^n taken out */
+    double u[3];               /* mapped: (u0 kx + u1 ky, u2 ky) */
+    double *p_re, *p_im, *y_re, *y_im;   /* phases along x and y */
+};
+
+/* Where one thread makes its rows. */
+struct lines {
+    struct row row;
+    double *arg;               /* ld abscissae */
+    double *phi;               /* of a mapped object: (nmax+1) x ld basis at them */
+    double *acc[4];            /* folded rows */
+    double *line, *t[4];       /* without a table: scratch of otf_row; rows +-ky of T */
+    double *fft;               /* scratch of the transform to pixels */
+};
+
+/* The half plane of frequencies: two planes, rows of ld. */
+struct plane {
+    double *re, *im;
+    size_t ld;
+    int columns;           /* 0..columns-1 hold something */
+};
+
+/* A part of a stamp on its way. */
+struct drawing {
+    struct transform t;
+    struct shape shape;
+    struct plane f;
+    double kcut, scale;
+};
+
 struct stamp_work {
     double *mem;           /* arena of `cap` doubles */
     size_t cap, used;
-    double *freq;          /* two planes of n x round8(n/2+1), and scratch of the transform */
+    double *freq;          /* two planes of n x round8(n/2+1), and what lines points to */
     size_t freq_cap;
+    struct drawing d;
+    struct lines lines;
 };
 
 int stamp_work_new(struct stamp_work **w)
@@ -49,19 +94,22 @@ static size_t round8(size_t n)
     return (n + LANES - 1) / LANES * LANES;
 }
 
+/* Make *mem hold at least `doubles`, of no value; the old block goes first. */
+static int need(double **mem, size_t *cap, size_t doubles)
+{
+    if (doubles <= *cap)
+        return OK;
+    free(*mem);
+    *mem = aligned_alloc(64, round8(doubles) * sizeof **mem);
+    *cap = *mem ? round8(doubles) : 0;
+    return *mem ? OK : E_NOMEM;
+}
+
 /* Make the arena hold `doubles` and forget what it held. */
 static int arena_reset(struct stamp_work *w, size_t doubles)
 {
     w->used = 0;
-    if (doubles <= w->cap)
-        return OK;
-    double *p = aligned_alloc(64, round8(doubles) * sizeof *p);
-    if (!p)
-        return E_NOMEM;
-    free(w->mem);
-    w->mem = p;
-    w->cap = round8(doubles);
-    return OK;
+    return need(&w->mem, &w->cap, doubles);
 }
 
 /* The next n doubles of the arena; arena_reset was asked for enough. */
@@ -70,19 +118,6 @@ static double *arena_take(struct stamp_work *w, size_t n)
     double *p = w->mem + w->used;
     w->used += round8(n);
     return p;
-}
-
-static int freq_need(struct stamp_work *w, size_t doubles)
-{
-    if (doubles <= w->freq_cap)
-        return OK;
-    double *p = aligned_alloc(64, round8(doubles) * sizeof *p);
-    if (!p)
-        return E_NOMEM;
-    free(w->freq);
-    w->freq = p;
-    w->freq_cap = doubles;
-    return OK;
 }
 
 /* ---- transfer function ---- */
@@ -251,27 +286,6 @@ WIDE static void phases(int m, double s, int n, double *re, double *im)
     }
 }
 
-/* One row of the transform at +u_y (p) and -u_y (m): columns 0..m-1. */
-struct row {
-    double *p_re, *p_im, *m_re, *m_im;
-};
-
-/* Everything the rows of one object need. */
-struct transform {
-    const struct stamp_grid *g;
-    const struct shape *s;
-    int nmax, ld;              /* ld: columns, a multiple of 8 */
-    double *phi;               /* (nmax+1) x ld basis at u_x >= 0 */
-    double *phi_y;             /* the same along y (phi itself when the axes are alike) */
-    double *ve, *vo;           /* (nmax+1) x ld sums over even and odd n1, for each n2 */
-    double *coef;              /* coefficients with the factors (-i)^n taken out */
-    double *arg;               /* ld abscissae of a mapped row */
-    double u[3];               /* mapped: (u0 kx + u1 ky, u2 ky) */
-    double *p_re, *p_im, *y_re, *y_im;   /* phases along x and y */
-    double *acc[4];            /* folded rows */
-    double *line, *t[4];       /* without a table: scratch of otf_row; rows +-ky of T */
-};
-
 /* c (-i)^(n1+n2) as a real number that belongs to the real (n even) or imaginary part (n odd). */
 static void take_phase_out(int nmax, const double *c, double *out)
 {
@@ -323,7 +337,7 @@ WIDE static void row_separable(int nmax, int ld, int m, const double *f, const d
 }
 
 /* Row at u_y = ky du of a mapped object, from phi_n1 at its own abscissae. */
-static int row_mapped(const struct transform *t, int ky, int m, double *re, double *im)
+static int row_mapped(const struct transform *t, const struct lines *l, int ky, int m, double *re, double *im)
 {
     const int nmax = t->nmax, ld = t->ld;
     const double b = TWO_PI * t->s->beta_x * t->g->du;
@@ -339,12 +353,12 @@ static int row_mapped(const struct transform *t, int ky, int m, double *re, doub
         odd[n1] = s[1];
     }
     for (int i = 0; i < m; i++)
-        t->arg[i] = b * (t->u[0] * i + t->u[1] * ky);
-    st = shapelet_basis(nmax, 1, m, t->arg, t->phi);
+        l->arg[i] = b * (t->u[0] * i + t->u[1] * ky);
+    st = shapelet_basis(nmax, 1, m, l->arg, l->phi);
     memset(re, 0, (size_t)ld * sizeof *re);
     memset(im, 0, (size_t)ld * sizeof *im);
     for (int n1 = 0; n1 <= nmax && st == OK; n1++) {
-        const double *f = t->phi + (size_t)n1 * (size_t)m;
+        const double *f = l->phi + (size_t)n1 * (size_t)m;
         for (int i = 0; i < m; i++) {
             re[i] += even[n1] * f[i];
             im[i] += odd[n1] * f[i];
@@ -430,35 +444,41 @@ static int axis_basis(const struct transform *t, double beta, double *x, double 
     return shapelet_basis(t->nmax, 1, t->ld, x, phi);
 }
 
-/* Lay out scratch memory and compute what does not depend on the row. */
-static int transform_start(struct transform *t, struct stamp_work *w, const struct stamp_grid *g,
-                           const struct shape *s, int columns)
+/* Lay out a thread's lines for t, behind `before` doubles of w->freq. */
+static int lay_lines(struct stamp_work *w, const struct transform *t, size_t before)
 {
-    t->g = g;
-    t->s = s;
-    t->nmax = s->coef ? s->nmax : -1;
-    t->ld = (int)round8((size_t)columns);
-    const size_t ld = (size_t)t->ld, h = round8((size_t)g->n / 2 + 1), orders = (size_t)(t->nmax + 1);
-    const size_t nc = s->coef ? shapelet_count(s->nmax) : 0;
-    const size_t line = g->columns ? round8((size_t)g->otf.n + 8) : 0;
-    int st = arena_reset(w, 4 * orders * ld + 13 * ld + 4 * h + 2 * round8(nc) + line);
+    const struct stamp_grid *g = t->g;
+    const size_t ld = (size_t)t->ld, h = round8((size_t)g->n / 2 + 1), fft = round8(lanes_scratch(g->fft));
+    const size_t made = g->columns ? ld : 0, line = g->columns ? round8((size_t)g->otf.n + 8) : 0, phi = t->s->mapped ? (size_t)(t->nmax + 1) * ld : 0;
+    int st = need(&w->freq, &w->freq_cap, before + fft + 5 * ld + 4 * h + 4 * made + line + phi);
     if (st)
         return st;
-    t->line = arena_take(w, line);
-    memset(t->line, 0, line * sizeof *t->line);
-    for (int i = 0; i < 4; i++)
-        t->t[i] = g->columns && (i < 2 || g->otf.sim) ? arena_take(w, ld) : NULL;
-    t->phi = arena_take(w, orders * ld);
-    t->phi_y = t->phi;
-    t->ve = arena_take(w, orders * ld);
-    t->vo = arena_take(w, orders * ld);
-    t->arg = arena_take(w, ld);
+    struct lines *l = &w->lines;
+    double *at = w->freq + before;
+    double **const part[] = {&l->fft, &l->row.p_re, &l->row.p_im, &l->row.m_re, &l->row.m_im, &l->arg, &l->acc[0], &l->acc[1], &l->acc[2], &l->acc[3],
+                             &l->t[0], &l->t[1], &l->t[2], &l->t[3], &l->line, &l->phi};
+    const size_t size[] = {fft, ld, ld, ld, ld, ld, h, h, h, h, made, made, made, made, line, phi};
+    for (size_t i = 0; i < sizeof size / sizeof size[0]; at += size[i++])
+        *part[i] = at;
+    if (!g->otf.sim)
+        l->t[2] = l->t[3] = NULL;
+    memset(l->line, 0, line * sizeof *l->line);
+    return OK;
+}
+
+/* Compute what does not depend on the row, with w->lines laid out and t->g, s, nmax, ld set. */
+static int transform_start(struct transform *t, struct stamp_work *w)
+{
+    const struct shape *s = t->s;
+    const size_t ld = (size_t)t->ld, orders = (size_t)(t->nmax + 1), nc = s->coef ? shapelet_count(s->nmax) : 0;
+    const int alike = s->beta_y == s->beta_x;
+    int st = arena_reset(w, 4 * ld + 2 * round8(nc) + (s->mapped ? 0 : alike ? 3 : 4) * orders * ld);
+    if (st)
+        return st;
     t->p_re = arena_take(w, ld);
     t->p_im = arena_take(w, ld);
     t->y_re = arena_take(w, ld);
     t->y_im = arena_take(w, ld);
-    for (int i = 0; i < 4; i++)
-        t->acc[i] = arena_take(w, h);
     if (!s->coef)
         return OK;
     t->coef = arena_take(w, nc);
@@ -470,10 +490,13 @@ static int transform_start(struct transform *t, struct stamp_work *w, const stru
         return st;
     }
     take_phase_out(s->nmax, s->coef, t->coef);
-    st = axis_basis(t, s->beta_x, t->arg, t->phi);
-    if (st == OK && s->beta_y != s->beta_x) {
+    t->phi = t->phi_y = arena_take(w, orders * ld);
+    t->ve = arena_take(w, orders * ld);
+    t->vo = arena_take(w, orders * ld);
+    st = axis_basis(t, s->beta_x, w->lines.arg, t->phi);
+    if (st == OK && !alike) {
         t->phi_y = arena_take(w, orders * ld);
-        st = axis_basis(t, s->beta_y, t->arg, t->phi_y);
+        st = axis_basis(t, s->beta_y, w->lines.arg, t->phi_y);
     }
     if (st == OK)
         sum_over_n1(t->nmax, t->ld, t->ld, t->coef, t->phi, t->ve, t->vo);
@@ -481,8 +504,9 @@ static int transform_start(struct transform *t, struct stamp_work *w, const stru
 }
 
 /* The object's transform on rows +-ky, columns 0..m-1. */
-static int transform_row(const struct transform *t, int ky, int m, const struct row *r)
+static int transform_row(const struct transform *t, const struct lines *l, int ky, int m)
 {
+    const struct row *r = &l->row;
     if (!t->s->coef) {
         for (int k = 0; k < m; k++) {
             r->p_re[k] = r->m_re[k] = 1;
@@ -494,50 +518,36 @@ static int transform_row(const struct transform *t, int ky, int m, const struct 
         row_separable(t->nmax, t->ld, m, t->phi_y + ky, t->ve, t->vo, r);
         return OK;
     }
-    int st = row_mapped(t, ky, m, r->p_re, r->p_im);
-    return st ? st : row_mapped(t, -ky, m, r->m_re, r->m_im);
+    int st = row_mapped(t, l, ky, m, r->p_re, r->p_im);
+    return st ? st : row_mapped(t, l, -ky, m, r->m_re, r->m_im);
 }
 
-/* The half plane of frequencies: two planes, rows of ld. */
-struct plane {
-    double *re, *im;
-    size_t ld;
-    int columns;           /* 0..columns-1 hold something */
-};
-
 /* Rows +-ky, all bands beyond the grid's own frequencies added onto it. */
-static void add_folded(const struct transform *t, int ky, int m, double c, double d, const struct row *r, const struct plane *f)
+static void add_folded(const struct transform *t, const struct lines *l, int ky, int m, double c, double d, const struct plane *f)
 {
+    const struct row *r = &l->row;
     const int n = t->g->n, h = n / 2, rows = n / t->g->parts, row = ky % rows, mirror = (rows - row) % rows;
     for (int i = 0; i < 4; i++)
-        memset(t->acc[i], 0, ((size_t)h + 1) * sizeof(double));
-    row_fold(n, m, r->p_re, r->p_im, t->acc[0], t->acc[1], t->acc[2], t->acc[3]);
-    row_fold(n, m, r->m_re, r->m_im, t->acc[2], t->acc[3], t->acc[0], t->acc[1]);
-    row_add(h, t->acc[0], t->acc[1], c, d, f->re + (size_t)row * f->ld, f->im + (size_t)row * f->ld);
+        memset(l->acc[i], 0, ((size_t)h + 1) * sizeof(double));
+    row_fold(n, m, r->p_re, r->p_im, l->acc[0], l->acc[1], l->acc[2], l->acc[3]);
+    row_fold(n, m, r->m_re, r->m_im, l->acc[2], l->acc[3], l->acc[0], l->acc[1]);
+    row_add(h, l->acc[0], l->acc[1], c, d, f->re + (size_t)row * f->ld, f->im + (size_t)row * f->ld);
     if (ky > 0)
-        row_add(h, t->acc[2], t->acc[3], c, -d, f->re + (size_t)mirror * f->ld, f->im + (size_t)mirror * f->ld);
+        row_add(h, l->acc[2], l->acc[3], c, -d, f->re + (size_t)mirror * f->ld, f->im + (size_t)mirror * f->ld);
 }
 
 /* Rows +-ky when there is only the one band. */
-static void put_row(const struct transform *t, int ky, int m, double c, double d, const struct row *r, const struct plane *f)
+static void put_row(const struct transform *t, const struct lines *l, int ky, int m, double c, double d, const struct plane *f)
 {
+    const struct row *r = &l->row;
     const size_t up = (size_t)ky * f->ld, down = (size_t)(t->g->n / t->g->parts - ky) * f->ld;
     row_store(m, f->columns, r->p_re, r->p_im, c, d, f->re + up, f->im + up);
     if (ky > 0)
         row_store(m, f->columns, r->m_re, r->m_im, c, -d, f->re + down, f->im + down);
 }
 
-/* Zero what rows of one band leave out, or everything, of n rows. */
-static void clear(const struct plane *f, int n, int single, int top)
-{
-    for (int row = single ? top + 1 : 0; row < (single ? n - top : n); row++) {
-        memset(f->re + (size_t)row * f->ld, 0, (size_t)f->columns * sizeof(double));
-        memset(f->im + (size_t)row * f->ld, 0, (size_t)f->columns * sizeof(double));
-    }
-}
-
 /* Row ky of T, columns 0..m-1: of the table, or made in `side` 0, 1 of the scratch. */
-static void transfer_row(const struct transform *t, int ky, int m, int side, const double **re, const double **im)
+static void transfer_row(const struct transform *t, const struct lines *l, int ky, int m, int side, const double **re, const double **im)
 {
     const struct stamp_grid *g = t->g;
     if (!g->columns) {
@@ -546,42 +556,62 @@ static void transfer_row(const struct transform *t, int ky, int m, int side, con
         *im = g->t_im ? g->t_im + at : NULL;
         return;
     }
-    otf_row(&g->otf, g->columns, m, ky * g->du, t->line, t->t[side], t->t[2 + side]);
-    apply_factors(g, ky, m, t->t[side], t->t[2 + side]);
-    *re = t->t[side];
-    *im = t->t[2 + side];
+    otf_row(&g->otf, g->columns, m, ky * g->du, l->line, l->t[side], l->t[2 + side]);
+    apply_factors(g, ky, m, l->t[side], l->t[2 + side]);
+    *re = l->t[side];
+    *im = l->t[2 + side];
 }
 
-/* Rows +-ky: transform, transfer function, phases along x; in columns 0..*m-1. */
-static int make_rows(const struct transform *t, double kcut, int ky, const struct row *r, int *m)
+/* Rows +-ky: transform, transfer function, phases along x; into columns 0..*m-1 of the lines. */
+static int make_rows(const struct drawing *d, const struct lines *l, int ky, int *m)
 {
-    const struct stamp_grid *g = t->g;
-    const double reach = sqrt(kcut * kcut - (double)ky * ky);
+    const struct transform *t = &d->t;
+    const struct row *r = &l->row;
+    const double reach = sqrt(d->kcut * d->kcut - (double)ky * ky);
     const double *up[2], *down[2];
-    *m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
-    int st = transform_row(t, ky, *m, r);
+    *m = 1 + (reach < t->g->kmax ? (int)reach : t->g->kmax);
+    int st = transform_row(t, l, ky, *m);
     if (st)
         return st;
-    transfer_row(t, ky, *m, 0, &up[0], &up[1]);
+    transfer_row(t, l, ky, *m, 0, &up[0], &up[1]);
     row_transfer(*m, up[0], up[1], t->p_re, t->p_im, r->p_re, r->p_im);
-    transfer_row(t, -ky, *m, 1, &down[0], &down[1]);
+    transfer_row(t, l, -ky, *m, 1, &down[0], &down[1]);
     row_transfer(*m, down[0], down[1], t->p_re, t->p_im, r->m_re, r->m_im);
     return OK;
 }
 
-/* All rows: transform, transfer function, phases, aliases; into f. */
-static int fold_rows(const struct transform *t, double kcut, double scale, const struct row *r, const struct plane *f)
+/* The same with the phase along y, into the plane. */
+static int fold_row(const struct drawing *d, const struct lines *l, int ky, int single)
 {
-    const struct stamp_grid *g = t->g;
-    const int rows = g->n / g->parts, top = kcut < g->kmax ? (int)kcut : g->kmax, single = top < rows / 2;
-    clear(f, rows, single, top);
-    for (int ky = 0; ky <= top; ky++) {
-        int m, st = make_rows(t, kcut, ky, r, &m);
-        if (st)
-            return st;
-        (single ? put_row : add_folded)(t, ky, m, scale * t->y_re[ky], scale * t->y_im[ky], r, f);
+    const struct transform *t = &d->t;
+    int m, st = make_rows(d, l, ky, &m);
+    if (st == OK)
+        (single ? put_row : add_folded)(t, l, ky, m, d->scale * t->y_re[ky], d->scale * t->y_im[ky], &d->f);
+    return st;
+}
+
+static void clear_row(const struct plane *f, int row)
+{
+    memset(f->re + (size_t)row * f->ld, 0, (size_t)f->columns * sizeof(double));
+    memset(f->im + (size_t)row * f->ld, 0, (size_t)f->columns * sizeof(double));
+}
+
+/* Rows k and rows - k of the plane, k <= rows / 2, with all bands that fall onto them: no other row of it is touched. */
+static int fold_pair(const struct drawing *d, const struct lines *l, int k)
+{
+    const struct stamp_grid *g = d->t.g;
+    const int rows = g->n / g->parts, top = d->kcut < g->kmax ? (int)d->kcut : g->kmax, single = top < rows / 2, mirror = (rows - k) % rows;
+    if (!single || k > top) {
+        clear_row(&d->f, k);
+        clear_row(&d->f, mirror);
     }
-    return OK;
+    int st = OK;
+    for (int band = 0; band + k <= top && st == OK; band += rows) {
+        st = fold_row(d, l, band + k, single);
+        if (mirror != k && band + mirror <= top && st == OK)
+            st = fold_row(d, l, band + mirror, single);
+    }
+    return st;
 }
 
 /* Half planes of width stamp_width(n): columns 0..n/2 and more, a multiple of 8. */
@@ -595,36 +625,31 @@ size_t stamp_stride(int n)
     return 2 * stamp_width(n);
 }
 
-/* The frequencies of a part, folded into f; doubles of scratch behind which rows are kept. */
-static int frequencies(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
-                       double kcut, double *rows, struct plane *f)
-{
-    const int columns = 1 + (kcut < g->kmax ? (int)kcut : g->kmax);
-    const size_t ld = round8((size_t)columns);
-    struct transform t = {0};
-    int st = transform_start(&t, w, g, s, columns);
-    if (st)
-        return st;
-    phases(t.ld, x, g->n, t.p_re, t.p_im);
-    phases(t.ld, y, g->n, t.y_re, t.y_im);
-    const struct row r = {rows, rows + ld, rows + 2 * ld, rows + 3 * ld};
-    f->columns = columns < g->n / 2 + 1 ? columns : g->n / 2 + 1;
-    double scale = flux / ((double)g->n * g->n);
-    if (s->coef)
-        scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
-    return fold_rows(&t, kcut, scale, &r, f);
-}
-
 static int drawable(const struct shape *s, double x, double y, double flux, double kcut)
 {
     return kcut >= 0 && isfinite(x) && isfinite(y) && isfinite(flux)
            && (!s->coef || (s->nmax >= 0 && s->nmax <= SHAPELET_NMAX && s->beta_x > 0 && s->beta_y > 0));
 }
 
-/* Doubles of four rows of frequencies. */
-static size_t rows_need(const struct stamp_grid *g, double kcut)
+/* What a part needs before its first row; `planes` doubles of w->freq are left for the frequencies. */
+static int start(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux, double kcut, size_t planes)
 {
-    return 4 * round8((size_t)(1 + (kcut < g->kmax ? (int)kcut : g->kmax)));
+    const int columns = 1 + (kcut < g->kmax ? (int)kcut : g->kmax);
+    struct drawing *d = &w->d;
+    struct transform *t = &d->t;
+    *d = (struct drawing){.shape = *s, .kcut = kcut, .scale = flux / ((double)g->n * g->n)};
+    *t = (struct transform){.g = g, .s = &d->shape, .nmax = s->coef ? s->nmax : -1, .ld = (int)round8((size_t)columns)};
+    int st = lay_lines(w, t, planes);
+    if (st == OK)
+        st = transform_start(t, w);
+    if (st)
+        return st;
+    phases(t->ld, x, g->n, t->p_re, t->p_im);
+    phases(t->ld, y, g->n, t->y_re, t->y_im);
+    d->f.columns = columns < g->n / 2 + 1 ? columns : g->n / 2 + 1;
+    if (s->coef)
+        d->scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
+    return OK;
 }
 
 int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y,
@@ -633,30 +658,72 @@ int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct
     if (!drawable(s, x, y, flux, kcut) || g->parts != 1)
         return E_RANGE;
     const size_t width = stamp_width(g->n), nfreq = (size_t)g->n * width;
-    int st = freq_need(w, 2 * nfreq + round8(lanes_scratch(g->fft)) + rows_need(g, kcut));
-    if (st)
-        return st;
-    double *scratch = w->freq + 2 * nfreq, *rows = scratch + round8(lanes_scratch(g->fft));
-    struct plane f = {w->freq, w->freq + nfreq, width, 0};
-    st = frequencies(g, w, s, x, y, flux, kcut, rows, &f);
+    int st = start(g, w, s, x, y, flux, kcut, 2 * nfreq);
+    struct plane *f = &w->d.f;
+    *f = (struct plane){w->freq, w->freq + nfreq, width, f->columns};
+    for (int k = 0; k <= g->n / 2 && st == OK; k++)
+        st = fold_pair(&w->d, &w->lines, k);
     if (st == OK)
-        lanes_run(g->fft, f.columns, f.re, f.im, (int)width, scratch, out);
+        lanes_run(g->fft, f->columns, f->re, f->im, (int)width, w->lines.fft, out);
     return st;
+}
+
+int stamp_part_start(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
+                     double kcut, int part, double *plane)
+{
+    if (!drawable(s, x, y, flux, kcut) || part < 0 || part >= g->parts)
+        return E_RANGE;
+    const size_t width = stamp_width(g->n);
+    int st = start(g, w, s, x, y - part, flux, kcut, 0);
+    struct plane *f = &w->d.f;
+    *f = (struct plane){plane, plane + width, 2 * width, f->columns};
+    return st;
+}
+
+int stamp_part_items(const struct stamp_work *w, enum stamp_stage stage)
+{
+    const struct stamp_grid *g = w->d.t.g;
+    const int rows = g->n / g->parts;
+    return ((stage == STAMP_FREQUENCIES ? rows / 2 + 1 : stage == STAMP_COLUMNS ? w->d.f.columns : rows) + LANES - 1) / LANES;
+}
+
+int stamp_part_join(const struct stamp_work *w, struct stamp_work *own)
+{
+    return w == own ? OK : lay_lines(own, &w->d.t, 0);
+}
+
+int stamp_part_frequencies(const struct stamp_work *w, struct stamp_work *own, int item)
+{
+    const int half = w->d.t.g->n / w->d.t.g->parts / 2, end = (item + 1) * LANES;
+    int st = OK;
+    for (int k = item * LANES; k < end && k <= half && st == OK; k++)
+        st = fold_pair(&w->d, &own->lines, k);
+    return st;
+}
+
+void stamp_part_columns(const struct stamp_work *w, struct stamp_work *own, int item)
+{
+    const struct plane *f = &w->d.f;
+    lanes_columns(w->d.t.g->fft, item * LANES, f->re, f->im, (int)f->ld, own->lines.fft);
+}
+
+void stamp_part_rows(const struct stamp_work *w, struct stamp_work *own, int item, double *out, size_t stride)
+{
+    const struct plane *f = &w->d.f;
+    lanes_rows(w->d.t.g->fft, item * LANES, f->columns, f->re, f->im, (int)f->ld, own->lines.fft, out, stride);
 }
 
 int stamp_fourier_part(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
                        double kcut, int part, double *plane)
 {
-    if (!drawable(s, x, y, flux, kcut) || part < 0 || part >= g->parts)
-        return E_RANGE;
-    const size_t width = stamp_width(g->n), scratch = round8(lanes_scratch(g->fft));
-    int st = freq_need(w, scratch + rows_need(g, kcut));
-    if (st)
-        return st;
-    struct plane f = {plane, plane + width, 2 * width, 0};
-    st = frequencies(g, w, s, x, y - part, flux, kcut, w->freq + scratch, &f);
-    if (st == OK)
-        lanes_run_in_place(g->fft, f.columns, plane, (int)width, (int)(2 * width), w->freq);
+    const size_t stride = stamp_stride(g->n);
+    int st = stamp_part_start(g, w, s, x, y, flux, kcut, part, plane);
+    for (int k = 0; st == OK && k < stamp_part_items(w, STAMP_FREQUENCIES); k++)
+        st = stamp_part_frequencies(w, w, k);
+    for (int k = 0; st == OK && k < stamp_part_items(w, STAMP_COLUMNS); k++)
+        stamp_part_columns(w, w, k);
+    for (int k = 0; st == OK && k < stamp_part_items(w, STAMP_ROWS); k++)
+        stamp_part_rows(w, w, k, plane + (size_t)k * LANES * stride, stride);
     return st;
 }
 
@@ -678,28 +745,24 @@ int stamp_broad(const struct stamp_grid *g, struct stamp_work *w, const struct s
     const int top = kcut < g->kmax ? (int)kcut : g->kmax;
     const size_t ld = round8((size_t)top + 1);
     const double step = pixel / (g->n * g->pixel);
-    struct transform t = {0};
     struct broad b;
-    int st = freq_need(w, 4 * ld + broad_scratch((int)ld));
-    if (st == OK)
-        st = transform_start(&t, w, g, s, top + 1);
+    int st = start(g, w, s, x * pixel / g->pixel, y * pixel / g->pixel, flux, kcut, round8(broad_scratch((int)ld)));
     if (st)
         return st;
-    const struct row r = {w->freq, w->freq + ld, w->freq + 2 * ld, w->freq + 3 * ld};
+    const struct transform *t = &w->d.t;
+    const struct row *r = &w->lines.row;
     double scale = flux * step * step;
     if (s->coef)
         scale *= TWO_PI * sqrt(s->beta_x * s->beta_y);
-    phases(t.ld, x * pixel / g->pixel, g->n, t.p_re, t.p_im);
-    phases(t.ld, y * pixel / g->pixel, g->n, t.y_re, t.y_im);
-    broad_begin(&b, step, nx, ny, out, (int)ld, w->freq + 4 * ld);
+    broad_begin(&b, step, nx, ny, out, (int)ld, w->freq);
     for (int ky = 0; ky <= top; ky++) {
         int m;
-        st = make_rows(&t, kcut, ky, &r, &m);
+        st = make_rows(&w->d, &w->lines, ky, &m);
         if (st)
             return st;
-        row_turn(m, scale * t.y_re[ky], scale * t.y_im[ky], r.p_re, r.p_im);
-        row_turn(m, scale * t.y_re[ky], -scale * t.y_im[ky], r.m_re, r.m_im);
-        broad_take(&b, ky, m, r.p_re, r.p_im, r.m_re, r.m_im);
+        row_turn(m, scale * t->y_re[ky], scale * t->y_im[ky], r->p_re, r->p_im);
+        row_turn(m, scale * t->y_re[ky], -scale * t->y_im[ky], r->m_re, r->m_im);
+        broad_take(&b, ky, m, r->p_re, r->p_im, r->m_re, r->m_im);
     }
     broad_end(&b);
     return OK;

@@ -106,6 +106,21 @@ MUST_CHECK int stamp_fourier_part(const struct stamp_grid *g, struct stamp_work 
 size_t stamp_stride(int n);
 
 /*
+ * The same by threads side by side: one starts the part with w; then each joins with work of its `own` (which may be w), and they share
+ * the items 0, 1, ... of each stage in any way; nobody begins a stage before the last is ended.  An item of the last makes rows
+ * 8 item .. 8 item + 7 of the part (those that there are), `stride` doubles apart, in out: theirs in the plane, or anywhere.
+ * The same bits.
+ */
+enum stamp_stage { STAMP_FREQUENCIES, STAMP_COLUMNS, STAMP_ROWS };
+MUST_CHECK int stamp_part_start(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
+                                double kcut, int part, double *plane);
+MUST_CHECK int stamp_part_join(const struct stamp_work *w, struct stamp_work *own);
+int stamp_part_items(const struct stamp_work *w, enum stamp_stage stage);
+MUST_CHECK int stamp_part_frequencies(const struct stamp_work *w, struct stamp_work *own, int item);
+void stamp_part_columns(const struct stamp_work *w, struct stamp_work *own, int item);
+void stamp_part_rows(const struct stamp_work *w, struct stamp_work *own, int item, double *out, size_t stride);
+
+/*
  * Any nx x ny pixels of an object of few frequencies: g has the period, n g->pixel, and one part; the pixels
  * have the side `pixel` and x, y count them.  kcut may be beyond n / 2 (broad.h).
  */

@@ -1,4 +1,4 @@
-/* test_par.c - loops on threads: every item once, failures end them, and turns are kept whoever works. */
+/* test_par.c - loops on threads: every item once, failures end them, turns are kept whoever works, and crews meet. */
 #include "check.h"
 #include "par.h"
 #include <sched.h>
@@ -110,11 +110,82 @@ static void masks_stay(void)
 }
 #endif
 
+enum { STAGES = 40 };
+
+struct crewed {
+    struct par_crew *crew;
+    int done[STAGES];              /* items of each stage */
+    int early;                     /* threads that found the stage before unfinished */
+    int fail;                      /* stage in which somebody fails, or -1 */
+    int left[STAGES];              /* threads that left after that stage with the failure */
+};
+
+static int items_of(int stage)
+{
+    return (stage * 7) % 23;
+}
+
+/* Forty stages of 0 to 22 items of unequal length; nobody may see a stage before all items of the last are done. */
+static int stages(void *ctx, long begin, long end, int worker)
+{
+    struct crewed *c = ctx;
+    int st = OK;
+    (void)begin;
+    (void)end;
+    (void)worker;
+    for (int stage = 0; stage < STAGES; stage++) {
+        if (stage && __atomic_load_n(&c->done[stage - 1], __ATOMIC_RELAXED) != items_of(stage - 1))
+            __atomic_add_fetch(&c->early, 1, __ATOMIC_RELAXED);
+        for (long item; st == OK && (item = par_crew_take(c->crew)) < items_of(stage);) {
+            for (volatile long k = 0; k < (item * 7919) % 2000; k++)
+                continue;
+            __atomic_add_fetch(&c->done[stage], 1, __ATOMIC_RELAXED);
+            if (stage == c->fail && item == 0)
+                st = E_NOCONV;
+        }
+        st = par_crew_meet(c->crew, st);
+        if (st) {
+            __atomic_add_fetch(&c->left[stage], 1, __ATOMIC_RELAXED);
+            return st;
+        }
+    }
+    return OK;
+}
+
+static void crews(void)
+{
+    static struct crewed c;
+    for (int threads = 1; threads <= 5; threads += 2) {
+        struct par_team *team = par_team_new(threads);
+        const int size = par_team_size(team);
+        int good = 1, left = 1;
+        for (int k = 0; k < 20; k++) {
+            memset(&c, 0, sizeof c);
+            c.fail = -1;
+            c.crew = par_crew_new(size);
+            good &= c.crew && par_team_for(team, size, 1, stages, &c) == OK && c.early == 0;
+            for (int stage = 0; stage < STAGES; stage++)
+                good &= c.done[stage] == items_of(stage);
+            par_crew_free(c.crew);
+            memset(&c, 0, sizeof c);
+            c.fail = 1 + k;
+            c.crew = par_crew_new(size);
+            left &= c.crew && par_team_for(team, size, 1, stages, &c) == E_NOCONV && c.left[c.fail] == size && c.done[c.fail + 1] == 0;
+            par_crew_free(c.crew);
+        }
+        check_that(good, "a crew of %d: no item twice, none of a stage before the last is ended, 20 times 40 stages", size);
+        check_that(left, "a crew of %d: one failure, and all leave with it at the end of its stage", size);
+        par_team_free(team);
+    }
+    check_that(par_crew_new(0) == NULL, "no threads, no crew");
+}
+
 int main(void)
 {
 #ifdef CPU_COUNT
     masks_stay();
 #endif
+    crews();
     static int times[N];
     for (int threads = 1; threads <= 5; threads += 2) {
         memset(times, 0, sizeof times);

@@ -157,6 +157,69 @@ static void determinism(const struct otf *t)
     }
 }
 
+/* The stamps of all objects, each made alone, summed in double; behind that the sum of their absolute values. */
+static double *sum_of_stamps(const struct plan *p)
+{
+    const long nx = p->view.nx, ny = p->view.ny;
+    double *sum = calloc((size_t)(2 * nx * ny), sizeof *sum), *scratch = malloc((3 * plan_scratch(p) + 1) * sizeof *scratch);
+    struct stamp_work *w;
+    if (!sum || !scratch || stamp_work_new(&w))
+        exit(1);
+    for (size_t i = 0; i < p->n; i++) {
+        const struct draw *d = &p->draw[i];
+        double *stamp = d->path == PATH_NONE ? NULL : malloc((size_t)d->nx * (size_t)d->ny * sizeof *stamp);
+        if (!stamp)
+            continue;
+        if (scene_stamp(p, i, w, scratch, stamp))
+            exit(1);
+        for (long y = d->y0 < 0 ? 0 : d->y0; y < ny && y < (long)d->y0 + d->ny; y++)
+            for (long x = d->x0 < 0 ? 0 : d->x0; x < nx && x < (long)d->x0 + d->nx; x++) {
+                const double value = stamp[(y - d->y0) * d->nx + x - d->x0];
+                sum[y * nx + x] += value;
+                sum[nx * ny + y * nx + x] += fabs(value);
+            }
+        free(stamp);
+    }
+    stamp_work_free(w);
+    free(scratch);
+    return sum;
+}
+
+/* Stamps that all threads make together, some in parts, some larger than the image. */
+static void together(const struct otf *t)
+{
+    enum { N = 8 };
+    struct emitter *s = field(N, 300);
+    struct view v = {.nx = 300, .ny = 250, .pixel = 0.05, .psf = t, .g1 = 0.03, .g2 = 0.04};
+    struct accuracy a = ACCURACY_DEFAULT;
+    struct plan p;
+    struct image im[4];
+    int good = 1, tall = 0, cut = 0;
+    a.eps = 6e-8;
+    if (scene_plan(&p, &v, &a, N, s))
+        exit(1);
+    for (size_t i = 0; i < N; i++) {
+        tall += p.draw[i].ny > 200;
+        cut += p.draw[i].path == PATH_FOURIER && p.grid[p.draw[i].grid].parts > 1;
+    }
+    for (int k = 0; k < 4; k++) {
+        static const int threads[4] = {1, 2, 3, 7};
+        good &= image_new(&im[k], v.nx, v.ny) == OK && scene_render(&p, &im[k], threads[k], NULL) == OK
+                && !memcmp(im[k].pix, im[0].pix, image_count(&im[0]) * sizeof *im[0].pix);
+    }
+    check_that(good && tall > cut && cut > 0, "%d tall stamps, %d of them in parts: 1, 2, 3 and 7 threads give the same bytes", tall, cut);
+    double *sum = sum_of_stamps(&p);
+    struct check k = check_begin("tall stamps in the image = the sum of all stamps, each made alone (a rounding to float for each)");
+    for (size_t i = 0; i < image_count(&im[0]); i++)
+        check_close(&k, (double)im[0].pix[i], sum[i], N * 6e-8 * sum[image_count(&im[0]) + i]);
+    check_end(&k);
+    free(sum);
+    for (int i = 0; i < 4; i++)
+        image_free(&im[i]);
+    plan_free(&p);
+    field_free(s, N);
+}
+
 /* What is not asked for is not made. */
 static void only_what_is_needed(const struct otf *t)
 {
@@ -252,6 +315,7 @@ int main(void)
     struct otf t = {0};
     telescope(&t);
     determinism(&t);
+    together(&t);
     only_what_is_needed(&t);
     series();
     strange(&t);
