@@ -196,6 +196,20 @@ int main(void)
         long bad = 500;
         check_that(par_for(N, 7, threads, fail_at, &bad) == E_NOCONV, "%d threads: a failure is told", threads);
     }
+    for (int threads = 2; threads <= 5; threads++) {
+        struct par_team *team = par_team_new(threads);
+        int once = 1;
+        for (int n = 1; n < N; n += 37) {
+            memset(times, 0, sizeof times);
+            once &= par_team_for(team, n, 7, count, times) == OK;
+            for (int i = 0; i < N; i++)
+                once &= times[i] == (i < n);
+        }
+        long bad = 500;
+        once &= par_team_for(team, N, 7, fail_at, &bad) == E_NOCONV;
+        par_team_free(team);
+        check_that(once, "a team of %d: every item of 28 loops once, a failure is told", threads);
+    }
     check_that(par_for(-1, 1, 1, count, times) == E_RANGE && par_for(1, 0, 1, count, times) == E_RANGE && par_for(1, 1, 0, count, times) == E_RANGE,
                "sizes that make no sense");
 
