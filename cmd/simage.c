@@ -105,6 +105,29 @@ static void check_options(const struct request *r, const struct opt *own, const 
 
 /* ---- input ---- */
 
+/* Bytes of the list in memory. */
+static double list_bytes(const struct table *t)
+{
+    return 8.0 * (double)t->nrow * (double)(t->ncol + 1);
+}
+
+static void check_memory(double bytes, const char *name, const struct common *c)
+{
+    if (bytes > c->max_memory)
+        die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", name, 1e-6 * bytes);
+}
+
+/* What objects, their parts and the image will take, refused before it is taken; the list stays for --truth alone. */
+static void check_objects(const struct input *in, const struct request *r, const struct view *v, const struct common *c)
+{
+    const double n = (double)in->scene.n, list = r->truth ? list_bytes(&in->list) : 0;
+    double parts, drawing;
+    if (emission_bytes(&in->scene, &parts, &drawing))
+        die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
+    const double making = list + n * (double)(sizeof(struct object) + (r->wcs ? 6 : 2) * sizeof(double)) + parts;
+    check_memory(fmax(making, parts + drawing + 4.0 * (double)v->nx * (double)v->ny), c->argv[0], c);
+}
+
 static void read_scene(struct input *in, const struct request *r, const struct common *c)
 {
     struct err e;
@@ -116,6 +139,7 @@ static void read_scene(struct input *in, const struct request *r, const struct c
             || models_open(&in->models, &in->catalogue, r->models, &e))
             die(EXIT_RUN, "%s", e.text);
     }
+    check_memory(list_bytes(&in->list) + (double)in->list.nrow * (double)sizeof(struct object), name, c);
     if (scene_open(&in->scene, &in->list, r->models ? &in->models : NULL, r->zeropoint, name, &e))
         die(EXIT_RUN, "%s", e.text);
 }
@@ -343,9 +367,8 @@ static void make_plan(struct plan *p, const struct view *v, const struct request
     if (st == E_RANGE)
         die(EXIT_RUN, "%s: the PSF's cut-off and the pixels do not fit: fewer than 64 bands are possible", r->psf ? r->psf : "-");
     check(st);
-    if (p->bytes + 4.0 * (double)v->nx * (double)v->ny > c->max_memory)
-        die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", c->argv[0],
-            1e-6 * (p->bytes + 4.0 * (double)v->nx * (double)v->ny));
+    check_memory(p->bytes + (double)e->n * (double)(sizeof *e->emitter + sizeof *e->coef + RENDER_BYTES) + 4.0 * (double)v->nx * (double)v->ny,
+                 c->argv[0], c);
     if (c->check || c->verbose)
         print_plan(stderr, p, r);
     report(p->n_bad, p->n_short, c);
@@ -444,6 +467,10 @@ static void run(const struct request *r, const struct common *c, const char *rec
     read_wcs(&in, r, c);
     set_size(&in, r, c->argv[0], &v);
     check(describe(&im.hdr, &in, r, &v));
+    check_objects(&in, r, &v, c);
+    const int keep = r->truth && !c->check;
+    if (!keep)
+        table_free(&in.list);
 
     double *x = malloc((2 * in.scene.n + 1) * sizeof *x);
     double (*map)[4] = r->wcs ? malloc((in.scene.n + 1) * sizeof *map) : NULL;
@@ -457,9 +484,11 @@ static void run(const struct request *r, const struct common *c, const char *rec
     if (st == E_RANGE)
         die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
     check(st);
+    if (!keep)
+        scene_free(&in.scene);
     if (!r->whole)
         make_plan(&plan, &v, r, c, &emission);
-    if (r->truth && !c->check)
+    if (keep)
         write_truth(&in, r, c, &im.hdr, x, x + in.scene.n, record);
     scene_free(&in.scene);
     table_free(&in.list);

@@ -1,5 +1,6 @@
 /* emit.c - a scene list turned into what the renderer draws. */
 #include "emit.h"
+#include "render.h"
 #include "shear.h"
 #include <math.h>
 #include <stdlib.h>
@@ -134,7 +135,7 @@ static int emit_round(struct emission *e, const struct object *o, struct emitter
             bend(to, map);
         to->rotation = 0;
         to->parity = 1;
-        to->parts = k ? 0 : n;
+        to->parts = (short)(k ? 0 : n);
         coef[k] = 1 / (2 * sqrt(M_PI) * to->beta);
         to->coef = &coef[k];
     }
@@ -167,6 +168,17 @@ static int count_parts(const struct scene *s, size_t *total)
         }
         *total += o->type == OBJECT_SERSIC ? (size_t)parts : 1;
     }
+    return OK;
+}
+
+int emission_bytes(const struct scene *s, double *emission, double *drawing)
+{
+    size_t total = 0;
+    int st = count_parts(s, &total);
+    if (st)
+        return st;
+    *emission = (double)total * (double)(sizeof(struct emitter) + sizeof(double));
+    *drawing = (double)total * (double)(sizeof(struct draw) + RENDER_BYTES);
     return OK;
 }
 

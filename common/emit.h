@@ -31,6 +31,9 @@ MUST_CHECK int emission_new(struct emission *e, const struct scene *s, const str
                             const double *y, double (*map)[4], double exptime);
 void emission_free(struct emission *e);
 
+/* Bytes that emission_new takes, and that plan and drawing take for each emitter. E_RANGE as there. */
+MUST_CHECK int emission_bytes(const struct scene *s, double *emission, double *drawing);
+
 /*
  * Gaussians of a Sersic profile of half-light radius 1: sigma[k] and flux[k] (sum 1), at
  * most SERSIC_PARTS; returns their number, 0 when n is outside 0.5..8.

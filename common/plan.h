@@ -20,13 +20,13 @@ struct emitter {
     double x, y;           /* pixels of the image, centre of the first is 0 */
     double flux;           /* electrons in the whole exposure */
     const double *coef;    /* shapelet coefficients of unit flux, 1/arcsec; NULL: a point */
-    int nmax;
-    int parity;            /* -1: mirrored, y -> -y */
     double beta;           /* arcsec */
     double rotation;       /* rad, anticlockwise */
     double dilation;       /* > 0 */
     double g1, g2;         /* own reduced shear */
-    int parts;             /* this and the next parts-1 are one object and share its tolerance; 0, 1: alone */
+    int nmax;
+    short parts;           /* this and the next parts-1 are one object and share its tolerance; 0, 1: alone */
+    signed char parity;    /* -1: mirrored, y -> -y */
 };
 
 /* Shear `first`, then `then` = rotation by *turn (rad), then shear g. E_RANGE for |g| >= 1. */

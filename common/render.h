@@ -13,6 +13,8 @@
 #include "plan.h"
 #include "progress.h"
 
+#define RENDER_BYTES 20        /* that drawing takes for each emitter */
+
 /* Add to im (of the view's size, as image_new made it). bar may be NULL. */
 MUST_CHECK int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar);
 

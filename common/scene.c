@@ -2,6 +2,7 @@
  * scene.c - a scene list checked and converted, row by row.
  */
 #include "scene.h"
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -147,8 +148,9 @@ static void read_model(struct reader *r, const struct columns *c, const struct m
         r->st = err_set(r->e, E_MISSING, "%s: row %zu: TYPE shapelet needs a shapelet catalogue", r->name, r->row + 1);
     if (r->st)
         return;
-    o->model = models_find(m, c->model->v.i[r->row]);
-    if (o->model == m->n)
+    const size_t model = models_find(m, c->model->v.i[r->row]);
+    o->model = (unsigned int)model;
+    if (model == m->n || model > UINT_MAX)
         r->st = err_set(r->e, E_MISSING, "%s: row %zu: MODEL %lld is not in the shapelet catalogue", r->name, r->row + 1,
                         (long long)c->model->v.i[r->row]);
 }
@@ -170,7 +172,7 @@ static int read_row(struct reader *r, const struct columns *c, const struct mode
                     struct object *to)
 {
     struct object o = {.parity = 1, .dilation = 1, .re = 0, .n = 0.5, .q = 1};
-    o.type = read_type(r, c);
+    o.type = (unsigned char)read_type(r, c);
     read_place(r, c, where, zeropoint, &o);
     if (o.type != OBJECT_STAR)
         read_map(r, c, &o);

@@ -27,11 +27,8 @@ enum object_type { OBJECT_STAR, OBJECT_SHAPELET, OBJECT_GAUSS, OBJECT_SERSIC };
 
 struct object {
     int64_t id;            /* ID, else the row number from 1 */
-    enum object_type type;
     double x, y;           /* in the unit of scene.where */
     double flux;           /* electron/s */
-    size_t model;          /* index into the models (shapelet) */
-    int parity;            /* +1, or -1: y -> -y first of all */
     double rot;            /* radians anticlockwise */
     double dilation;       /* > 0: all lengths times this, same flux (beta d, coefficients / d) */
     double g1, g2;         /* own reduced shear, |g| < 1 */
@@ -39,6 +36,9 @@ struct object {
     double n;              /* Sersic index, 0.5..8 */
     double q;              /* axis ratio, 0 < q <= 1 */
     double pa;             /* radians anticlockwise from +x */
+    unsigned int model;    /* index into the models (shapelet) */
+    unsigned char type;    /* enum object_type */
+    signed char parity;    /* +1, or -1: y -> -y first of all */
 };
 
 struct scene {

@@ -24,3 +24,14 @@ done
 # larger than the image, without a PSF
 printf '# DX DY MAG TYPE RE\n0 0 18 gauss 60\n' >huge.txt
 coefficients=1 bounded huge.txt 0.04 1
+# a long list: 208 bytes for each object more, and --max-memory counts them before they are taken
+awk 'BEGIN { print "# DX DY FLUX TYPE RE"; for (i = 0; i < 400000; i++) printf "0.03 0.01 %d star 0.1\n", 1 + i % 7 }' >many.txt
+limit=$(awk 'BEGIN { printf "%.0f", 1024 * 33 + (4 * 1e4 + 208 * 4e5) / 1024 }')
+for o in "" "-p psf.fits --accuracy 1e-2"; do
+    peak peak.txt simage many.txt -x 0.1 --size 100,100 -q $o -o out.fits || fail "simage many.txt $o"
+    between "simage, 400000 objects, $o: peak KiB" "$(cut -d' ' -f1 peak.txt)" 40000 "$limit"
+done
+fails "400000 objects in 40 MB" 1 simage many.txt -x 0.1 --size 100,100 --max-memory 40M -o out.fits
+sed 's/star/sersic/; s/RE$/RE N/; s/0.1$/0.1 4/' many.txt | head -100000 >sersic.txt
+fails "the parts of 1e5 Sersic profiles in 100 MB" 1 simage sersic.txt -x 0.1 --size 100,100 --max-memory 100M -o out.fits
+ok "400000 objects in 100 MB" simage many.txt -x 0.1 --size 100,100 --max-memory 100M -q -o out.fits
