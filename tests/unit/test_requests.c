@@ -87,7 +87,7 @@ static struct scene all_objects(const struct models *m)
         const size_t other = i < m->n ? 0 : i - m->n;
         struct object *o = &s.object[i];
         *o = (struct object){.type = i < m->n ? OBJECT_SHAPELET : other < STARS ? OBJECT_STAR : other < STARS + GAUSS ? OBJECT_GAUSS : OBJECT_SERSIC,
-                             .model = i < m->n ? i : 0, .parity = k % 2 ? 1 : -1, .dilation = k % 7 ? 1 : 0.7 + 0.6 * uniform(k, 4),
+                             .model = i < m->n ? (unsigned int)i : 0, .parity = k % 2 ? 1 : -1, .dilation = k % 7 ? 1 : 0.7 + 0.6 * uniform(k, 4),
                              .rot = k % 3 ? 0 : 6.3 * uniform(k, 5), .re = 0.08 * pow(10, 0.9 * uniform(k, 6)), .q = 0.3 + 0.7 * uniform(k, 7),
                              .pa = 3.1 * uniform(k, 8), .n = index[other % 7]};
         if (k % 11 == 3) {
