@@ -5,8 +5,8 @@
  * pixel and 14 for each run of them while objects are being separated, and up to
  * 90 for the pixels of the component in hand: a component larger than DETECT_MOST
  * pixels and a DETECT_PART of the image is not split, gets the flag
- * DETECT_UNSEPARATED, and all stays below 32 MiB + 12 bytes per pixel and what the
- * rows of the catalogue take (about 450 bytes each).
+ * DETECT_UNSEPARATED, and all stays below 32 MiB + 12 bytes per pixel (16 where every
+ * second pixel is a run by itself) and what the rows of the catalogue take (about 450 bytes each).
  */
 #ifndef PIXSHEAR_DETECT_H
 #define PIXSHEAR_DETECT_H
