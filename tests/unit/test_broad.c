@@ -1,6 +1,7 @@
 /*
  * test_broad.c - objects larger than any stamp: the sum over frequencies against the transform of a stamp of the same
- * period, and planned scenes against the Fourier integral as a plain sum over another period.
+ * period, and planned scenes against the Fourier integral as a plain sum over another period; objects of all sizes and
+ * orders against such a sum, too.
  */
 #include "scenes.h"
 #include "broad.h"
@@ -165,6 +166,119 @@ static void scene(const struct otf *t, double pixel, double beta, int nmax, doub
     plan_free(&p);
 }
 
+/* ---- every order, every scale ---- */
+
+enum { SIDE = 500, AT = 32 };
+
+/* Middle pixels one by one, then fewer and fewer outwards, to the edge of the image. */
+static const int from_middle[AT] = {-249, -160, -100, -60, -40, -28, -20, -14, -10, -8, -6, -5, -4, -3, -2, -1, 0,
+                                    1, 2, 3, 4, 5, 6, 8, 10, 14, 20, 28, 40, 60, 100, 160};
+
+/* (-i)^n c of one row of frequencies: re[n1] + i im[n1] = sum over n2 with b[n2 stride], phi_n2 at u_y. */
+static void row_of(int nmax, const double *c, const double *b, size_t stride, double *re, double *im)
+{
+    static const double co[4] = {1, 0, -1, 0}, si[4] = {0, -1, 0, 1};
+    memset(re, 0, (size_t)(nmax + 1) * sizeof *re);
+    memset(im, 0, (size_t)(nmax + 1) * sizeof *im);
+    for (int n = 0; n <= nmax; n++)
+        for (int n1 = 0; n1 <= n; n1++, c++) {
+            re[n1] += co[n & 3] * *c * b[(size_t)(n - n1) * stride];
+            im[n1] += si[n & 3] * *c * b[(size_t)(n - n1) * stride];
+        }
+}
+
+/*
+ * Pixels of the list around the middle of the view: frequencies k / period, |k| <= top period, line by line, of basis functions,
+ * spline of the transfer function and sinc of the pixel; the half u_y > 0 twice.
+ */
+static int by_lines(const struct view *v, const struct emitter *e, double period, double top, double *out)
+{
+    const int m = (int)(top * period), nmax = e->nmax;
+    const size_t n = (size_t)(2 * m + 1);
+    double *u = malloc(n * (size_t)(7 + nmax + 1 + 4 * AT) * sizeof *u), *k = u + n, *box = k + n, *t = box + n, *ti = t + n, *fr = ti + n, *fi = fr + n;
+    double *b = fi + n, *xc = b + n * (size_t)(nmax + 1), *xs = xc + n * AT, *yc = xs + n * AT, *ys = yc + n * AT;
+    double ar[SHAPELET_NMAX + 1], ai[SHAPELET_NMAX + 1];
+    for (size_t i = 0; u && i < n; i++) {
+        u[i] = ((double)i - m) / period;
+        k[i] = 2 * PI * e->beta * u[i];
+        box[i] = i == (size_t)m ? 1 : sin(PI * u[i] * v->pixel) / (PI * u[i] * v->pixel);
+        for (size_t a = 0; a < AT; a++) {
+            const double x = 2 * PI * u[i] * v->pixel * (SIDE / 2 + from_middle[a] - e->x), y = 2 * PI * u[i] * v->pixel * (SIDE / 2 + from_middle[a] - e->y);
+            xc[a * n + i] = cos(x), xs[a * n + i] = sin(x), yc[a * n + i] = cos(y), ys[a * n + i] = sin(y);
+        }
+    }
+    int st = u ? shapelet_basis(nmax, 1, (int)n, k, b) : E_NOMEM;
+    memset(out, 0, AT * AT * sizeof *out);
+    for (size_t j = (size_t)m; j < n && st == OK; j++) {
+        st = otf_grid(v->psf, (int)n, u, 1, &u[j], t, ti);
+        row_of(nmax, e->coef, b + j, n, ar, ai);
+        memset(fr, 0, 2 * n * sizeof *fr);
+        for (int n1 = 0; n1 <= nmax; n1++)
+            for (size_t i = 0; i < n; i++) {
+                fr[i] += ar[n1] * b[(size_t)n1 * n + i];
+                fi[i] += ai[n1] * b[(size_t)n1 * n + i];
+            }
+        const double weight = (j == (size_t)m ? 1 : 2) * e->flux * 2 * PI * e->beta * pow(v->pixel / period, 2) * box[j];
+        for (size_t i = 0; i < n; i++) {
+            const double re = fr[i], im = fi[i], tim = otf_is_real(v->psf) ? 0 : ti[i];
+            fr[i] = weight * box[i] * (re * t[i] - im * tim);
+            fi[i] = weight * box[i] * (re * tim + im * t[i]);
+        }
+        for (size_t a = 0; a < AT; a++) {
+            double re = 0, im = 0;
+            for (size_t i = 0; i < n; i++) {
+                re += fr[i] * xc[a * n + i] - fi[i] * xs[a * n + i];
+                im += fr[i] * xs[a * n + i] + fi[i] * xc[a * n + i];
+            }
+            for (size_t y = 0; y < AT; y++)
+                out[y * AT + a] += re * yc[y * n + j] - im * ys[y * n + j];
+        }
+    }
+    free(u);
+    return st;
+}
+
+/* Orders 0 to 60, beta .01 to 50 pixels: pixels of the planned scene at a request of 1e-6. */
+static void orders_and_scales(const struct otf *t)
+{
+    static const int order[7] = {0, 1, 2, 5, 12, 30, 60};
+    static const double scale[5] = {0.01, 0.1, 1, 10, 50};
+    const double pixel = 0.1, eps = 1e-6;
+    double want[AT * AT];
+    for (int b = 0; b < 5; b++) {
+        char what[100];
+        snprintf(what, sizeof what, "beta %g pixels, orders 0 to 60, PSF: pixels against a sum over frequencies, of the peak", scale[b]);
+        struct check k = check_begin(what);
+        for (int o = 0; o < 7; o++) {
+            const double beta = scale[b] * pixel, root = sqrt(2.0 * order[o] + 1);
+            double *c = galaxy(order[o], beta, 100 + order[o]);
+            const struct view v = {.nx = SIDE, .ny = SIDE, .pixel = pixel, .psf = t};
+            const struct emitter e = {.x = SIDE / 2 + 0.31, .y = SIDE / 2 - 0.17, .flux = 1, .coef = c, .nmax = order[o], .parity = 1, .beta = beta, .dilation = 1};
+            struct accuracy acc = ACCURACY_DEFAULT;
+            struct plan p = {0};
+            struct image im = {0};
+            acc.eps = eps;
+            int st = image_new(&im, SIDE, SIDE);
+            if (st == OK)
+                st = scene_plan(&p, &v, &acc, 1, &e);
+            if (st == OK)
+                st = scene_render(&p, &im, 1, NULL);
+            const double period = fmax(2 * pixel * fmax(p.draw ? p.draw[0].nx : 0, SIDE / 4), 2 * beta * (root + 9) + pixel * SIDE);
+            if (st == OK)
+                st = by_lines(&v, &e, period, fmin(t->ucut, (root + 7) / (2 * PI * beta)), want);
+            const double peak = peak_of(AT * AT, want);
+            for (int i = 0; i < AT * AT; i++) {
+                const long x = SIDE / 2 + from_middle[i % AT], y = SIDE / 2 + from_middle[i / AT];
+                check_close(&k, st ? NAN : (double)im.pix[y * SIDE + x] / peak, want[i] / peak, eps);
+            }
+            plan_free(&p);
+            image_free(&im);
+            free(c);
+        }
+        check_end(&k);
+    }
+}
+
 int main(void)
 {
     struct otf t = {0};
@@ -178,6 +292,7 @@ int main(void)
     scene(&t, 0.1, 85, 0, 1e-6, 0);
     scene(&t, 0.04, 10, 12, 1e-6, 1);
     scene(&t, 0.1, 20, 8, 1e-4, 1);
+    orders_and_scales(&t);
     otf_free(&t);
     return check_status();
 }
