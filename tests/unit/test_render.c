@@ -310,6 +310,73 @@ static void strange(const struct otf *t)
     image_free(&plain);
 }
 
+/* A galaxy of order 8 with light in every coefficient, in double, on 128 x 128 pixels. */
+static double *alone(const struct otf *t, const double own[2], const double field[2])
+{
+    enum { SIDE = 128 };
+    double c[45];
+    for (int i = 0; i < 45; i++)
+        c[i] = i ? 3 * (uniform(77, i) - 0.5) : 3;
+    const struct emitter e = {.x = 63.3, .y = 62.6, .flux = 1, .coef = c, .nmax = 8, .parity = 1, .beta = 0.3, .dilation = 1,
+                              .rotation = 0.4, .g1 = own[0], .g2 = own[1]};
+    const struct view v = {.nx = SIDE, .ny = SIDE, .pixel = 0.1, .psf = t, .g1 = field[0], .g2 = field[1]};
+    struct accuracy a = ACCURACY_DEFAULT;
+    struct plan p;
+    a.eps = 1e-12;
+    a.side_max = SIDE;
+    if (scene_plan(&p, &v, &a, 1, &e))
+        exit(1);
+    double *sum = sum_of_stamps(&p);
+    plan_free(&p);
+    return sum;
+}
+
+enum { AREA = 128 * 128 };
+
+/* All pixels of got, which this frees, against those of want, over the largest of want. */
+static void compare(const char *psf, const char *what, double g, double *got, const double *want, double tolerance)
+{
+    char line[120];
+    double peak = 0;
+    snprintf(line, sizeof line, "%s: order 8, g = %g, %s, of the peak", psf, g, what);
+    struct check k = check_begin(line);
+    for (int i = 0; i < AREA; i++)
+        peak = fmax(peak, fabs(want[i]));
+    for (int i = 0; i < AREA; i++)
+        check_close(&k, got[i] / peak, want[i] / peak, tolerance);
+    check_end(&k);
+    free(got);
+}
+
+/* Shears at an angle and their undoing, exactly and all but the last bit; zeros of both signs and the numbers next to them. */
+static void undone(const struct otf *t)
+{
+    static const double strength[] = {0.05, 0.5, 0.9, 0.9999}, nothing[] = {-0.0, 5e-324, 1e-310}, zero[2] = {0, 0};
+    for (int psf = 0; psf < 2; psf++) {
+        const struct otf *through = psf ? t : NULL;
+        const char *name = psf ? "PSF" : "no PSF";
+        double *plain = alone(through, zero, zero);
+        for (int k = 0; k < 4; k++) {
+            const double g[2] = {strength[k] * cos(0.9), strength[k] * sin(0.9)}, back[2] = {-g[0], -g[1]};
+            const double almost[2] = {-g[0], -nextafter(g[1], 0)};
+            compare(name, "sheared at an angle and back", strength[k], alone(through, g, back), plain, 1e-12);
+            if (strength[k] < 0.99)            /* beyond, the last bit is 4e-13 of the shear left */
+                compare(name, "back but for a bit", strength[k], alone(through, g, almost), plain, 1e-12);
+        }
+        for (int k = 0; k < 3; k++) {
+            const double g[2] = {nothing[k], nothing[k]};
+            double *own = alone(through, g, zero), *field = alone(through, zero, g);
+            int others = 0;
+            for (int i = 0; i < AREA; i++)
+                others += (float)own[i] != (float)plain[i] || (float)field[i] != (float)plain[i];
+            check_that(others == 0, "%s: g = %g, own or the field's: %d of %d pixels of a file have other bytes than with 0", name, nothing[k], others, AREA);
+            compare(name, "own, against 0", nothing[k], own, plain, nothing[k] != 0 ? 4e-15 : 0);
+            compare(name, "the field's, against 0", nothing[k], field, plain, nothing[k] != 0 ? 4e-15 : 0);
+        }
+        free(plain);
+    }
+}
+
 int main(void)
 {
     struct otf t = {0};
@@ -319,6 +386,7 @@ int main(void)
     only_what_is_needed(&t);
     series();
     strange(&t);
+    undone(&t);
     sersic();
     extremes(&t);
     otf_free(&t);
