@@ -271,6 +271,28 @@ for p in "--accuracy 1e-7" "-p soft.fits --accuracy 1e-5"; do
     near "flux in the file, $p" "$(pix sum f.fits)" 1 6e-8
 done
 
+# wavelengths so small and so large that the core (lambda/D = 0.004" and 2") is far below a pixel and wider than a grid of 9 samples:
+# a lone star, its pixels and its light against the sum over the nodes of the transfer function that psfgen makes with pixels of 0.1"
+printf '# DX DY FLUX TYPE\n0 0 1 star\n' >lone.txt
+small="--wavelength 40 --pupil-grid 1536"
+large="--wavelength 20000"
+psfgen $small -x 0.005 --size 65 -o p40.fits
+psfgen $small -x 0.1 --size 41 --pixel 0.1 -o e40.fits
+ok "a star at 40 nm" simage lone.txt -p p40.fits -x 0.1 --size 401,401 -T 1 --accuracy 1e-6 -o s.fits
+near "40 nm: flux within 40\"" "$(pix sum s.fits)" 1 1e-6
+simage lone.txt -p p40.fits -x 0.1 --size 41,41 -T 1 --accuracy 1e-6 -o s.fits
+near "40 nm: pixels within 4\", of the peak" "$(pix diff e40.fits s.fits | cut -d' ' -f1)" 0 1e-6
+for c in "2e-6:" "1e-6:--struts 0"; do                   # vanes: 1.8e-6 are those of a pupil of 256 cells
+    o=${c#*:}
+    psfgen $large $o -o p20.fits
+    psfgen $large $o --pupil-grid 1024 -x 0.1 --size 401 --pixel 0.1 -o e20.fits
+    simage lone.txt -p p20.fits -x 0.1 --size 401,401 -T 1 --accuracy 1e-6 -o s.fits
+    near "20 um${o:+, $o}: flux within 40\"" "$(pix sum s.fits)" "$(pix sum e20.fits)" 2e-5
+    near "20 um${o:+, $o}: pixels, of the peak" "$(pix diff e20.fits s.fits | cut -d' ' -f1)" 0 "${c%%:*}"
+done
+# far from the core of a ring, 1 - 2 lambda/D / (pi^2 (1 - .3) r) is inside r; the mean of 1/r along the square of half a side h is 2 sqrt(2) / (pi h)
+near "20 um, no vanes: flux within 40\", by hand to lowest order" "$(pix sum s.fits)" "$(awk 'BEGIN { p = atan2(0, -1); printf "%.9f", 1 - 2e-5 * 206264.806 / (p * p * 0.7) * 2 * sqrt(2) / (p * 20.05) }')" 5e-4
+
 # columns that a type does not use are not looked at; ID is a label
 printf '# DX DY FLUX TYPE\n0.03 0.01 1 star\n0.2 -0.1 2 star\n' >bare.txt
 printf '# ID DX DY FLUX TYPE RE G1 G2 ROT PARITY DILATION N Q PA\n7 0.03 0.01 1 star nan 5 5 nan 3 -1 99 0 nan\n7 0.2 -0.1 2 star 0 0 0 0 0 0 0 0 0\n' >full.txt
