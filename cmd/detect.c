@@ -420,14 +420,14 @@ static void detect_or_die(const struct frame *f, const char *in, const struct op
 static double predict(const struct frame *f)
 {
     const double n = (double)image_count(&f->im);
-    return 0.006 + 4e-9 * n + (f->scale > 0 ? fmin(1e-6 * f->scale * f->scale, 1e-7) * n : 1e-8 * n);
+    return 0.004 + 6.5e-9 * n + (f->scale > 0 ? fmin(1.75e-7 * f->scale * f->scale, 1e-8) * n : 3e-9 * n);
 }
 
 static void describe(const struct frame *f, const char *in, const struct detect_params *p)
 {
     double mb = (double)image_count(&f->im) * (f->map ? 8 : 4) / 1e6;
     fprintf(stderr, "detect: %s: %ld x %ld pixels of %g arcsec, kernel %.3f px, gain %g, zero point %g, "
-            "about %.0f MB and %.2f s\n", in, f->im.nx, f->im.ny, f->scale, p->kernel_fwhm, p->phot.gain,
+            "about %.0f MB and %.2g s\n", in, f->im.nx, f->im.ny, f->scale, p->kernel_fwhm, p->phot.gain,
             f->zeropoint, mb + 8, predict(f));
 }
 
