@@ -485,6 +485,48 @@ static void search(const struct frame *f, const struct program *prog, const stru
     detection_free(&d);
 }
 
+/* Options that contradict each other, or would do nothing. */
+static void check_options(const struct options *o, const struct opt *own, const struct common *c)
+{
+    if (o->p.back_filter % 2 == 0)
+        die(EXIT_USAGE, "--back-filter %ld: give an odd number", o->p.back_filter);
+    char unknown[64];
+    if (detectcat_unknown(o->columns, unknown))
+        die(EXIT_USAGE, "--columns: there is no column '%s': see detect(1)", unknown);
+    if (o->measure_weight && !o->measure)
+        die(EXIT_USAGE, "--measure-weight %s: is the weight of another image: give --measure", o->measure_weight);
+    static const char *const of_weight[] = {"weight-type", NULL}, *const of_clean[] = {"clean-slope", NULL}, *const of_levels[] = {"deblend-contrast", NULL},
+                      *const of_objects[] = {"columns", "apertures", "flux-fraction", "format", "measure", NULL};
+    if (!o->weight && !o->measure_weight)
+        opt_idle(own, c, of_weight, "without --weight");
+    if (o->no_clean)
+        opt_idle(own, c, of_clean, "with --no-clean");
+    if (o->p.levels == 1)
+        opt_idle(own, c, of_levels, "with --deblend-levels 1");
+    if (o->p.negative)
+        opt_idle(own, c, of_objects, "with --negative, which prints a count");
+    if (o->p.negative && o->region)
+        die(EXIT_USAGE, "--negative and --region: only a count is written");
+    if (o->p.negative)
+        opt_output(c->out, OUT_LINES);
+}
+
+/* The files read, the image first. */
+static size_t list_inputs(const struct options *o, const char *image, const char *inputs[5])
+{
+    size_t n = 0;
+    inputs[n++] = image;
+    if (o->weight)
+        inputs[n++] = o->weight;
+    if (o->mask)
+        inputs[n++] = o->mask;
+    if (o->measure)
+        inputs[n++] = o->measure;
+    if (o->measure_weight)
+        inputs[n++] = o->measure_weight;
+    return n;
+}
+
 int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
@@ -555,39 +597,10 @@ int main(int argc, char **argv)
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    const char *in = c.argv[0], *inputs[5] = {in};
-    size_t n_inputs = 1;
-    if (o.p.back_filter % 2 == 0)
-        die(EXIT_USAGE, "--back-filter %ld: give an odd number", o.p.back_filter);
-    char unknown[64];
-    if (detectcat_unknown(o.columns, unknown))
-        die(EXIT_USAGE, "--columns: there is no column '%s': see detect(1)", unknown);
-    if (o.measure_weight && !o.measure)
-        die(EXIT_USAGE, "--measure-weight %s: is the weight of another image: give --measure", o.measure_weight);
-    static const char *const of_weight[] = {"weight-type", NULL}, *const of_clean[] = {"clean-slope", NULL}, *const of_levels[] = {"deblend-contrast", NULL},
-                      *const of_objects[] = {"columns", "apertures", "flux-fraction", "format", "measure", NULL};
-    if (!o.weight && !o.measure_weight)
-        opt_idle(own, &c, of_weight, "without --weight");
-    if (o.no_clean)
-        opt_idle(own, &c, of_clean, "with --no-clean");
-    if (o.p.levels == 1)
-        opt_idle(own, &c, of_levels, "with --deblend-levels 1");
-    if (o.p.negative)
-        opt_idle(own, &c, of_objects, "with --negative, which prints a count");
-    if (o.p.negative && o.region)
-        die(EXIT_USAGE, "--negative and --region: only a count is written");
-    if (o.p.negative)
-        opt_output(c.out, OUT_LINES);
+    const char *in = c.argv[0], *inputs[5];
+    const size_t n_inputs = list_inputs(&o, in, inputs);
+    check_options(&o, own, &c);
     check_outputs(&o, c.out);
-    if (o.weight)
-        inputs[n_inputs++] = o.weight;
-    if (o.mask)
-        inputs[n_inputs++] = o.mask;
-    if (o.measure)
-        inputs[n_inputs++] = o.measure;
-    if (o.measure_weight)
-        inputs[n_inputs++] = o.measure_weight;
-
     struct frame f = {0};
     read_frame(&f, in, &o, own, &c);
     struct detect_params p = plan(&f, in, &o, own, &c);
