@@ -97,6 +97,9 @@ static void decide(const struct work *w, struct plan *p)
 {
     const struct request *r = w->r;
     const struct exposure *x = &p->x;
+    char seed[72];
+    if (header_str(&x->hdr, "NOISSEED", seed, sizeof seed) == OK)
+        die(EXIT_RUN, "%s: has noise already (NOISSEED): noise is drawn from expected electrons", p->label);
     if (x->unit != UNIT_NONE && x->unit != UNIT_ELECTRON)
         die(EXIT_RUN, "%s: BUNIT is not electron: noise is drawn from expected electrons", p->label);
     p->time = isnan(x->exptime) ? r->exptime : x->exptime;

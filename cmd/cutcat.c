@@ -200,6 +200,15 @@ static void check_only_where(const struct opt *own, const struct common *c)
             die(EXIT_USAGE, "--only-where and --%s: give the cut as --where, or leave --only-where out", cut[i]);
 }
 
+/* The catalogue's own stars and flags are cut where it tells them; asked for, they must be there. */
+static void check_asked(const struct table *t, const char *name, const struct opt *own, const struct common *c)
+{
+    static const char *const need[][2] = {{"star-prob", "STAR_PROB"}, {"flags", "FLAGS_RRG"}};
+    for (int i = 0; i < 2; i++)
+        if (opt_given(own, c, need[i][0]) && !table_find(t, need[i][1]))
+            die(EXIT_RUN, "%s: no column %s: --%s cannot cut", name, need[i][1], need[i][0]);
+}
+
 int main(int argc, char **argv)
 {
     struct common c = COMMON_DEFAULTS;
@@ -238,6 +247,7 @@ int main(int argc, char **argv)
     struct expr *where = parse_where(&p.where);
     if (table_in_open(&in, &t, c.argv[0], c.max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
+    check_asked(&t, c.argv[0], own, &c);
     cuts.locus_mag = p.locus[0];
     cuts.locus_width = p.locus[1];
     if (!cuts.only_where)

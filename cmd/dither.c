@@ -38,6 +38,9 @@ static void check_input(const struct work *w)
     char ctype[72];
     if (header_str(&w->x.hdr, "CTYPE1", ctype, sizeof ctype) == OK && strstr(ctype, "-SIP"))
         die(EXIT_RUN, "%s: SIP distortion cannot be rescaled: use TPV", w->name);
+    char seed[72];
+    if (header_str(&w->x.hdr, "NOISSEED", seed, sizeof seed) == OK)
+        warn("%s: has noise already (NOISSEED): its exposures will share it, and have less than they should", w->name);
     if (w->side[0] < 1 || w->side[1] < 1)
         die(EXIT_RUN, "%s: %ld x %ld pixels are too few for displaced pixels of %d x %d: no exposure would have one", w->name,
             w->x.nx, w->x.ny, w->n, w->n);
@@ -336,7 +339,9 @@ int main(int argc, char **argv)
     struct err e;
     if (fits_in_open(&w.in, w.name, c.max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    int index = fits_in_selected(w.in);
+    int index;
+    if (fits_in_single(w.in, &index, &e))
+        die(EXIT_RUN, "%s", e.text);
     if (index < 0 || fits_in_hdu(w.in, index)->nz != 1)
         die(EXIT_RUN, "%s: no plain image in it", w.name);
     if (exposure_read(w.in, w.name, index, &w.x, &e))

@@ -62,7 +62,9 @@ static void read_pixels(struct input *in, const char *name, double max_memory)
     struct fits_in *f;
     if (fits_in_open(&f, name, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    int k = fits_in_selected(f);
+    int k;
+    if (fits_in_single(f, &k, &e))
+        die(EXIT_RUN, "%s", e.text);
     if (k < 0)
         die(EXIT_RUN, "%s: no image in this file", name);
     const struct hdu *h = fits_in_hdu(f, k);
@@ -195,6 +197,23 @@ static struct shapecat_options options(const struct params *p, const struct inpu
     return o;
 }
 
+/* NUMBER of the rows read last against the labels under their centres: those of another catalogue would mask the objects themselves. */
+static void check_labels(const struct input *in, const char *segmentation)
+{
+    const struct column *x = table_find(&in->cat, "X_IMAGE"), *y = table_find(&in->cat, "Y_IMAGE"), *number = table_find(&in->cat, "NUMBER");
+    size_t own = 0, other = 0;
+    for (size_t i = 0; i < in->cat.nrow && in->map.label; i++) {
+        const double column = floor(table_number(x, i) - 0.5), row = floor(table_number(y, i) - 0.5);
+        if (!(column >= 0 && column < (double)in->nx && row >= 0 && row < (double)in->ny))
+            continue;
+        const double label = in->map.label[(size_t)row * (size_t)in->nx + (size_t)column];
+        own += label == table_number(number, i);
+        other += label > 0 && label != table_number(number, i);
+    }
+    if (other > own)
+        die(EXIT_RUN, "%s: %zu of %zu objects lie on labels of others: not the segmentation of %s", segmentation, other, own + other, in->cat_name);
+}
+
 /* Measure the stars of an image; the median size with their own widths goes to *own. */
 static void measure_stars(struct starmom *s, struct input *in, const char *cat, const struct params *p,
                           int threads, double *own)
@@ -209,6 +228,7 @@ static void measure_stars(struct starmom *s, struct input *in, const char *cat, 
     read_rows(in, SIZE_MAX);
     if (shapecat_stars(&in->cat, &o, 1 / in->scale, &stars, &n, &e))
         fail(cat, &e);
+    check_labels(in, p->segmentation);
     *s = (struct starmom){.dstar_w = fmax(0.8, 0.1 / in->scale)};
     check(starmom_widths(s, STARMOM_WIDTHS, 0.8, fmax(1 / in->scale, 2)), in->name);
     int st = starmom_measure(s, &in->map, n, stars, &o.moments, p->max_stars, p->average == 1, threads);
@@ -450,6 +470,7 @@ static void measure_objects(struct input *in, const struct params *p, const stru
     progress_begin(&bar, "shapes", -1, c->quiet || c->check);
     do {
         read_rows(in, rows);
+        check_labels(in, p->segmentation);
         n += in->cat.nrow;
         if (c->check)
             continue;
@@ -533,7 +554,8 @@ int main(int argc, char **argv)
         die(EXIT_USAGE, "give one of --stars FILE, --psf FILE, --psf none");
 
     static const char *const of_galaxies[] = {"stars", "psf", "fixed-width", "no-recenter", "centroid-term", "fourth", "psf-correction", "pixel", NULL},
-                      *const of_stars[] = {"max-stars", "star-average", NULL}, *const of_pixel[] = {"pixel", NULL};
+                      *const of_stars[] = {"max-stars", "star-average", NULL}, *const of_pixel[] = {"pixel", NULL},
+                      *const of_psf[] = {"fourth", "psf-correction", NULL}, *const of_width[] = {"width", "width-min", "width-max", NULL};
     split_stars(&p);
     if (p.stars_only)
         opt_idle(own, &c, of_galaxies, "with --stars-only");
@@ -541,6 +563,10 @@ int main(int argc, char **argv)
         opt_idle(own, &c, of_stars, "unless stars are measured in this run");
     if (!p.psf || strcmp(p.psf, "none") == 0)
         opt_idle(own, &c, of_pixel, "without --psf FILE");
+    if (p.psf && strcmp(p.psf, "none") == 0)
+        opt_idle(own, &c, of_psf, "with --psf none");
+    if (p.fixed > 0 && !p.star_image)
+        opt_idle(own, &c, of_width, "with --fixed-width");
     if (p.region && (p.stars_only || outfile_same(p.region, c.out)))
         die(EXIT_USAGE, "--region %s: not with --stars-only, and not the output", p.region);
     if (p.plain && (p.stars_only || outfile_same(p.plain, c.out) || (p.region && outfile_same(p.plain, p.region))))

@@ -174,6 +174,18 @@ int fits_in_selected(const struct fits_in *f)
     return -1;
 }
 
+int fits_in_single(const struct fits_in *f, int *index, struct err *e)
+{
+    const char *name = source_name(f->src);
+    int n = 0;
+    for (int i = 0; i < f->n && f->chosen < 0; i++)
+        n += f->hdu[i].is_image && !strcasecmp(f->hdu[i].extname, "SCI");
+    if (n > 1)
+        return err_set(e, E_DATA, "%s: %d images named SCI: say which, %s[SCI,1] or another", name, n, name);
+    *index = fits_in_selected(f);
+    return OK;
+}
+
 int fits_in_find(const struct fits_in *f, const char *extname, long extver)
 {
     for (int i = 0; i < f->n; i++)
@@ -457,7 +469,9 @@ int fits_in_rows_double(struct fits_in *f, int index, long z, long y0, long nrow
 /* The selected image of an open file. */
 static int read_selected(struct image *im, struct fits_in *f, double max_memory, struct err *e)
 {
-    int index = fits_in_selected(f);
+    int index, st = fits_in_single(f, &index, e);
+    if (st)
+        return st;
     const struct hdu *h = fits_in_hdu(f, index);
     const char *name = source_name(f->src);
     if (!h || !h->is_image)
@@ -468,7 +482,7 @@ static int read_selected(struct image *im, struct fits_in *f, double max_memory,
     if (!(bytes <= max_memory))
         return err_set(e, E_NOMEM, "%s: %ld x %ld pixels need %.3g MB, more than --max-memory", name,
                        h->nx, h->ny, bytes * 1e-6);
-    int st = image_room(im, h->nx, h->ny);
+    st = image_room(im, h->nx, h->ny);
     if (st)
         return err_set(e, st, "%s: %ld x %ld pixels: %s", name, h->nx, h->ny,
                        st == E_RANGE ? "a side is longer than 65535" : err_text(st));

@@ -47,6 +47,9 @@ const struct hdu *fits_in_hdu(const struct fits_in *f, int index);
 /* Index of the HDU that the name's suffix selects, else the first image; -1 when there is none. */
 int fits_in_selected(const struct fits_in *f);
 
+/* The same for who can use one image only: E_DATA when the file has several named SCI and no suffix says which. */
+MUST_CHECK int fits_in_single(const struct fits_in *f, int *index, struct err *e);
+
 /* Index of the image HDU with this EXTNAME (case-insensitive) and EXTVER (0: any), or -1. */
 int fits_in_find(const struct fits_in *f, const char *extname, long extver);
 

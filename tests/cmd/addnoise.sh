@@ -129,6 +129,7 @@ near "less the sky that is taken off" "$(awk -v s="$(card t.fits SATURATE)" -v l
 $F make seeded.fits 8 8 50 "$pc" "$ex" "$bu" "$mz" "SEED    = '12      '"
 ok "noise on a scene of seed 12" addnoise -s 34 seeded.fits -o t.fits
 [ "$(card t.fits SEED) $(card t.fits NOISSEED)" = "12 34" ] && pass "SEED 12, NOISSEED 34" || fail "SEED $(card t.fits SEED), NOISSEED $(card t.fits NOISSEED)"
-ok "noise again" addnoise -s 35 t.fits -o u.fits
-sum=$(card t.fits DATASUM)
+dither -n 1 seeded.fits -o parts.fits
+ok "noise on a file with sums" addnoise -s 35 parts.fits -o u.fits
+sum=$($F card parts.fits 1 DATASUM)
 [ -n "$sum" ] && grep -aq "HISTORY read DATASUM $sum " u.fits && pass "HISTORY names DATASUM $sum" || fail "HISTORY without DATASUM '$sum'"

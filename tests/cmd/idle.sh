@@ -25,6 +25,30 @@ idle max-stars rrgshape noisy.fits cat.txt --stars stars.rrg --max-stars 3
 idle star-average rrgshape noisy.fits cat.txt --psf none --star-average median
 idle pixel rrgshape noisy.fits cat.txt --stars stars.rrg --pixel 0.2
 idle pixel rrgshape noisy.fits cat.txt --psf none --pixel 0.2
+for o in fourth=plain psf-correction=first; do idle ${o%=*} rrgshape noisy.fits cat.txt --psf none --$o; done
+for o in width=2 width-min=0.2 width-max=0.5; do idle ${o%=*} rrgshape noisy.fits cat.txt --stars stars.rrg --fixed-width 3 --$o; done
+# noise twice, noise shared between exposures, one of several images, labels of other objects, cuts without their column
+fails "addnoise: an image that has noise" 1 addnoise noisy.fits -o made
+grep -q NOISSEED cmd.err && pass "the keyword is named" || fail "$(cat cmd.err)"
+ok "dither: a noisy image" dither -n 2 noisy.fits -o parts.fits
+grep -q "share it" cmd.err && pass "told" || fail "dither: $(cat cmd.err)"
+for p in "detect parts.fits" "rrgshape parts.fits cat.txt --psf none" "dither -n 2 parts.fits"; do
+    # shellcheck disable=SC2086
+    fails "$p: several images" 1 $p -o made
+    grep -q "4 images named SCI" cmd.err && pass "told" || fail "$p: $(cat cmd.err)"
+done
+ok "one of them named" detect "parts.fits[SCI,2]" -o part.cat
+detect noisy.fits --check-image segmentation=seg.fits -o seg.cat
+detect --threshold 8 noisy.fits --check-image segmentation=less.fits -o less.cat
+ok "rrgshape: its own labels" rrgshape noisy.fits seg.cat --stars stars.rrg --segmentation seg.fits -o seg.out
+cutcat --only-where --where 'NUMBER > 20' seg.cat -o some.cat
+ok "rrgshape: labels of a catalogue that was cut" rrgshape noisy.fits some.cat --stars stars.rrg --segmentation seg.fits -o seg.out
+fails "rrgshape: labels of another catalogue" 1 rrgshape noisy.fits seg.cat --stars stars.rrg --segmentation less.fits -o made
+grep -q "lie on labels of others" cmd.err && pass "told" || fail "rrgshape: $(cat cmd.err)"
+cutcat --only-where --columns NUMBER,E1,E2,D_RRG,FLUX_AUTO,FLUXERR_AUTO shapes.txt -o bare.txt
+ok "cutcat: no classes, none asked for" cutcat bare.txt --stars stars.rrg -o bare.use
+fails "cutcat: --star-prob without STAR_PROB" 1 cutcat bare.txt --stars stars.rrg --star-prob 0.5 -o made
+fails "cutcat: --flags without FLAGS_RRG" 1 cutcat bare.txt --stars stars.rrg --flags 3 -o made
 ln -s cut.txt link.txt
 fails "fom: a catalogue twice" 2 fom cut.txt cut.txt
 fails "fom: by another name" 2 fom cut.txt shapes.txt link.txt
