@@ -614,6 +614,19 @@ static int fold_pair(const struct drawing *d, const struct lines *l, int k)
     return st;
 }
 
+/* All rows, the same bits, in the order of the transfer function's in memory. */
+static int fold_rows(const struct drawing *d, const struct lines *l)
+{
+    const struct stamp_grid *g = d->t.g;
+    const int n = g->n, top = d->kcut < g->kmax ? (int)d->kcut : g->kmax, single = top < n / 2;
+    for (int row = single ? top + 1 : 0; row < (single ? n - top : n); row++)
+        clear_row(&d->f, row);
+    int st = OK;
+    for (int ky = 0; ky <= top && st == OK; ky++)
+        st = fold_row(d, l, ky, single);
+    return st;
+}
+
 /* Half planes of width stamp_width(n): columns 0..n/2 and more, a multiple of 8. */
 static size_t stamp_width(int n)
 {
@@ -661,8 +674,8 @@ int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct
     int st = start(g, w, s, x, y, flux, kcut, 2 * nfreq);
     struct plane *f = &w->d.f;
     *f = (struct plane){w->freq, w->freq + nfreq, width, f->columns};
-    for (int k = 0; k <= g->n / 2 && st == OK; k++)
-        st = fold_pair(&w->d, &w->lines, k);
+    if (st == OK)
+        st = fold_rows(&w->d, &w->lines);
     if (st == OK)
         lanes_run(g->fft, f->columns, f->re, f->im, (int)width, w->lines.fft, out);
     return st;
