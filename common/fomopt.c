@@ -114,28 +114,47 @@ static double lowest(size_t n, const double *x, const double *y)
     return v > x[0] && v < x[n - 1] ? exp(v) : NAN;
 }
 
-/* y of every scale with the blocks of draw k; weight and index have room for all of them. */
-static void draw(struct curve *c, const struct fom_options *o, long k, double *weight, uint32_t *index)
+/* Blocks drawn with replacement: how often each, and what the draws gave. */
+struct draws {
+    double *weight, *v;
+    uint32_t *index;
+};
+
+static void draws_free(struct draws *d)
 {
-    memset(weight, 0, c->labels * sizeof *weight);
-    stats_resample(c->labels, c->labels, o->seed, (uint64_t)k, index);
-    for (size_t i = 0; i < c->labels; i++)
-        weight[index[i]]++;
-    weigh(c, weight);
+    free(d->weight);
+    free(d->v);
+    free(d->index);
 }
 
-static double spread_of_draws(struct curve *c, const struct fom_options *o, double *weight, uint32_t *index, double *v)
+/* Room for the blocks of c and n values; draws_free also after failure. */
+static int draws_new(struct draws *d, const struct curve *c, size_t n)
+{
+    *d = (struct draws){malloc((c->labels + 1) * sizeof *d->weight), malloc((n + 1) * sizeof *d->v),
+                        malloc((c->labels + 1) * sizeof *d->index)};
+    return d->weight && d->v && d->index ? OK : E_NOMEM;
+}
+
+/* y of every scale with the blocks of draw k. */
+static void draw(struct curve *c, const struct fom_options *o, long k, struct draws *d)
+{
+    memset(d->weight, 0, c->labels * sizeof *d->weight);
+    stats_resample(c->labels, c->labels, o->seed, (uint64_t)k, d->index);
+    for (size_t i = 0; i < c->labels; i++)
+        d->weight[d->index[i]]++;
+    weigh(c, d->weight);
+}
+
+/* Scatter of the values of n draws, moved together; NaN, no error is known, when half of the draws or more gave none. */
+static double scatter(size_t n, double *v)
 {
     size_t used = 0;
     struct stats s;
-    for (long k = 0; k < o->draws; k++) {
-        draw(c, o, k, weight, index);
-        v[used] = lowest(c->n, c->theta, c->y);
-        used += isfinite(v[used]) ? 1 : 0;
-    }
+    for (size_t k = 0; k < n; k++)
+        if (isfinite(v[k]))
+            v[used++] = v[k];
     stats_sum(used, v, &s);
-    /* an optimum that many draws cannot find has no error */
-    return 2 * used > (size_t)o->draws ? sqrt(s.var) : NAN;
+    return 2 * used > n ? sqrt(s.var) : NAN;
 }
 
 /* The groups that `same` finds like `first` (one set: by scale) and their labels into c. */
@@ -160,26 +179,29 @@ static int collect(struct curve *c, size_t n, const struct fom_result *r, const 
 
 static int optimum_of_set(size_t n, struct fom_result *r, size_t first, const struct fom_options *o, struct curve *c)
 {
+    const size_t draws = (size_t)o->draws;
+    struct draws d = {0};
     double at = NAN, err = NAN;
     int st = collect(c, n, r, &r[first], same_set);
-    double *weight = malloc((c->labels + 1) * sizeof *weight), *v = malloc(((size_t)o->draws + 1) * sizeof *v);
-    uint32_t *index = malloc((c->labels + 1) * sizeof *index);
-    if (!weight || !v || !index)
-        st = E_NOMEM;
+    if (st == OK)
+        st = draws_new(&d, c, draws);
     if (st == OK && c->n >= LEAST_SCALES) {
         weigh(c, NULL);
         at = lowest(c->n, c->theta, c->y);
-        if (isfinite(at))
-            err = spread_of_draws(c, o, weight, index, v);
+    }
+    if (isfinite(at)) {
+        for (size_t k = 0; k < draws; k++) {
+            draw(c, o, (long)k, &d);
+            d.v[k] = lowest(c->n, c->theta, c->y);
+        }
+        err = scatter(draws, d.v);
     }
     for (size_t i = 0; i < n && st == OK; i++)
         if (same_set(&r[i], &r[first])) {
             r[i].v[FOM_OPT] = at;
             r[i].v[FOM_OPTERR] = err;
         }
-    free(weight);
-    free(v);
-    free(index);
+    draws_free(&d);
     return st;
 }
 
@@ -202,33 +224,21 @@ int fom_optimum(size_t n, struct fom_result *r, const struct fom_options *o)
 static int contrast_of_bin(size_t n, struct fom_result *r, const struct fom_result *to, const struct fom_options *o, struct curve *c)
 {
     const size_t draws = (size_t)o->draws;
-    int st = collect(c, n, r, to, same_bin);
-    double *weight = malloc((c->labels + 1) * sizeof *weight), *v = malloc((draws * c->n + 1) * sizeof *v);
-    uint32_t *index = malloc((c->labels + 1) * sizeof *index);
+    struct draws d = {0};
     size_t ref = 0;
-    struct stats s;
-    if (!weight || !v || !index)
-        st = E_NOMEM;
+    int st = collect(c, n, r, to, same_bin);
+    if (st == OK)
+        st = draws_new(&d, c, draws * c->n);
     while (ref < c->n && c->r[ref] != to)
         ref++;
-    for (long k = 0; k < o->draws && st == OK && ref < c->n; k++) {
-        draw(c, o, k, weight, index);
+    for (size_t k = 0; k < draws && st == OK && ref < c->n; k++) {
+        draw(c, o, (long)k, &d);
         for (size_t i = 0; i < c->n; i++)
-            v[i * draws + (size_t)k] = c->y[i] - c->y[ref];
+            d.v[i * draws + k] = c->y[i] - c->y[ref];
     }
-    for (size_t i = 0; i < c->n && st == OK && ref < c->n; i++) {
-        double *of = v + i * draws;
-        size_t used = 0;
-        for (size_t k = 0; k < draws; k++)
-            if (isfinite(of[k]))
-                of[used++] = of[k];
-        stats_sum(used, of, &s);
-        /* as with the optimum: many draws without a value are no error */
-        r[c->r[i] - r].v[FOM_LOGDCBS] = 2 * used > draws ? M_LOG10E * sqrt(s.var) : NAN;
-    }
-    free(weight);
-    free(v);
-    free(index);
+    for (size_t i = 0; i < c->n && st == OK && ref < c->n; i++)
+        r[c->r[i] - r].v[FOM_LOGDCBS] = M_LOG10E * scatter(draws, d.v + i * draws);
+    draws_free(&d);
     return st;
 }
 
