@@ -1,7 +1,7 @@
 /*
  * detect.c - find and measure the objects of an image.
  *
- * Background on meshes, Gaussian matched filter, threshold, deblending,
+ * Background on meshes, matched filter, threshold, deblending,
  * cleaning, Kron photometry, star/galaxy class; a catalogue comes out.
  */
 #include "catkeys.h"
@@ -10,6 +10,7 @@
 #include "exposure.h"
 #include "header.h"
 #include "imageio.h"
+#include "kernelio.h"
 #include "ldac.h"
 #include "opt.h"
 #include "outfile.h"
@@ -18,6 +19,7 @@
 #include "progress.h"
 #include "segment.h"
 #include "sky.h"
+#include "smooth.h"
 #include "tableio.h"
 #include <float.h>
 #include <math.h>
@@ -30,7 +32,7 @@ struct options {
     struct detect_params p;
     double kernel, psf_fwhm, pixscale, zeropoint, gain, saturation;
     int no_clean, weight_type;
-    const char *weight, *mask, *region, *columns, *measure, *measure_weight;
+    const char *kernel_file, *weight, *mask, *region, *columns, *measure, *measure_weight;
     int format;
     struct opt_strs checks;
     struct opt_reals apertures, fractions;
@@ -52,6 +54,8 @@ struct frame {
 static const char *const check_name[] = {"background", "rms", "filtered", "segmentation", "objects", "subtracted",
                                          "apertures"};
 enum check_type { BACKGROUND, RMS, FILTERED, SEGMENTATION, OBJECTS, SUBTRACTED, APERTURES, CHECKS };
+
+enum { BAND = 128 };           /* rows that are filtered at a time for a check image */
 
 enum format { BY_NAME, LDAC };
 
@@ -140,6 +144,14 @@ static void check_outputs(const struct options *o, const char *out)
     }
 }
 
+/* Images and maps, and `more`, must fit. */
+static void check_memory(const struct frame *f, const char *in, const struct options *o, const struct common *c, double more)
+{
+    double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0) + (o->measure_weight ? 4 : 0)) + 32 * 1048576.0 + more;
+    if (need > c->max_memory)
+        die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
+}
+
 static void read_frame(struct frame *f, const char *in, const struct options *o, const struct opt *own,
                        const struct common *c)
 {
@@ -147,9 +159,7 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     if (image_read(&f->im, in, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     pages_keep(image_count(&f->im) * sizeof(float));
-    double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0) + (o->measure_weight ? 4 : 0)) + 32 * 1048576.0;
-    if (need > c->max_memory)
-        die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
+    check_memory(f, in, o, c, 0);
     if (o->measure)
         read_beside(&f->other, o->measure, &f->im, c->max_memory);
     const struct header *h = &f->im.hdr, *flux = o->measure ? &f->other.hdr : h;
@@ -179,6 +189,31 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     read_maps(f, o, c);
 }
 
+/* The filter: from a file, or a Gaussian of the FWHM asked for, else of the PSF, else of 2 pixels. */
+static void make_filter(struct smooth *s, const struct frame *f, const char *in, const struct options *o, const struct opt *own,
+                        const struct common *c)
+{
+    if (o->kernel_file) {
+        struct kernel k;
+        struct err e;
+        if (kernel_read(&k, o->kernel_file, c->max_memory, &e))
+            die(EXIT_RUN, "%s", e.text);
+        int st = smooth_kernel(s, &k, f->im.nx, f->im.ny);
+        kernel_free(&k);
+        if (st == E_DATA)
+            die(EXIT_RUN, "%s: the largest value of a kernel must be between 1e-20 and 1e20: scale it, or write CONV NORM", o->kernel_file);
+        run(st, o->kernel_file);
+    } else {
+        double fwhm = f->psf_fwhm > 0 && f->scale > 0 ? f->psf_fwhm / f->scale : 2;
+        if (opt_given(own, c, "kernel"))
+            fwhm = o->kernel > 0 ? o->kernel / f->scale : 0;
+        if (fwhm > 1000)
+            die(EXIT_RUN, "%s: a kernel of %g pixels is more than 1000: check --kernel and the pixel scale", in, fwhm);
+        run(smooth_new(s, fwhm), in);
+    }
+    check_memory(f, in, o, c, c->threads * smooth_bytes(s, f->im.nx));
+}
+
 /* Parameters of the kernel, in pixels. */
 static struct detect_params plan(const struct frame *f, const char *in, const struct options *o,
                                  const struct opt *own, const struct common *c)
@@ -203,18 +238,11 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
     int subtracted;
     if (header_bool(h, "SKYSUB", &subtracted) == OK && subtracted)
         p.sky_removed = header_double_or(h, "SKYLEVEL", 0);
-    p.kernel_fwhm = 2;
-    if (f->psf_fwhm > 0 && f->scale > 0) {
+    if (f->psf_fwhm > 0 && f->scale > 0)
         p.phot.psf_fwhm = f->psf_fwhm / f->scale;
-        p.kernel_fwhm = p.phot.psf_fwhm;
-    }
     int sizes = (opt_given(own, c, "kernel") && o->kernel > 0) || o->apertures.n > 0;
     if (sizes && !(f->scale > 0))
         die(EXIT_RUN, "%s: no PIXSCALE and no world coordinates in the header: give --pixscale", in);
-    if (opt_given(own, c, "kernel"))
-        p.kernel_fwhm = o->kernel > 0 ? o->kernel / f->scale : 0;
-    if (p.kernel_fwhm > 1000)
-        die(EXIT_RUN, "%s: a kernel of %g pixels is more than 1000: check --kernel and the pixel scale", in, p.kernel_fwhm);
     return p;
 }
 
@@ -256,14 +284,11 @@ static void write_region(const char *name, const struct detection *d, const char
         die(EXIT_RUN, "%s", e.text);
 }
 
-/* Row y of a check image that holds floats. */
-static int check_row(enum check_type type, const struct frame *f, const struct detect_params *p,
-                     const struct detection *d, long y, float *row)
+/* Row y of a check image that holds floats, but FILTERED. */
+static int check_row(enum check_type type, const struct frame *f, const struct detection *d, long y, float *row)
 {
     long nx = f->im.nx;
     size_t at = (size_t)y * (size_t)nx;
-    if (type == FILTERED)
-        return segment_filtered(&f->im, &d->background, f->map, &d->filter, p->negative, y, 1, row);
     if (type == RMS && f->map) {
         memcpy(row, f->map + at, (size_t)nx * sizeof *row);
         return OK;
@@ -336,7 +361,7 @@ static void write_check(const char *text, const struct frame *f, const struct de
     struct fits_out *out;
     if (fits_out_open(&out, name, inputs, n, &e))
         die(EXIT_RUN, "%s", e.text);
-    float *row = malloc((size_t)f->im.nx * sizeof *row);
+    float *row = malloc((type == FILTERED ? BAND : 1) * (size_t)f->im.nx * sizeof *row);
     int32_t *label = malloc((size_t)f->im.nx * sizeof *label);
     unsigned char *mark = type == APERTURES ? draw_apertures(f, p, d) : NULL;
     int st = row && label ? fits_out_hdu(out, type == SEGMENTATION ? 32 : -32, f->im.nx, f->im.ny, 1, &h, &e)
@@ -345,8 +370,13 @@ static void write_check(const char *text, const struct frame *f, const struct de
         labels_row(&d->label, y, label);
         st = fits_out_rows_int(out, 1, label, &e);
     }
-    for (long y = 0; y < f->im.ny && type != SEGMENTATION && !st; y++) {
-        st = check_row(type, f, p, d, y, row);
+    for (long y = 0; y < f->im.ny && type == FILTERED && !st; y += BAND) {
+        const long many = f->im.ny - y < BAND ? f->im.ny - y : BAND;
+        st = segment_filtered(&f->im, &d->background, f->map, p->filter, p->negative, y, many, row);
+        st = st ? err_set(&e, st, "%s: %s", name, err_text(st)) : fits_out_rows(out, many, row, &e);
+    }
+    for (long y = 0; y < f->im.ny && type != SEGMENTATION && type != FILTERED && !st; y++) {
+        st = check_row(type, f, d, y, row);
         for (long x = 0; x < f->im.nx && mark; x++)
             row[x] = mark[(size_t)y * (size_t)f->im.nx + (size_t)x] ? (float)(10 * d->noise) : row[x];
         if (st)
@@ -417,18 +447,19 @@ static void detect_or_die(const struct frame *f, const char *in, const struct op
 }
 
 /* CPU seconds, good to a factor 2 at the depth of the experiment: a start, the pixels, some hundred objects per arcmin^2. */
-static double predict(const struct frame *f)
+static double predict(const struct frame *f, const struct detect_params *p)
 {
     const double n = (double)image_count(&f->im);
-    return 0.004 + 6.5e-9 * n + (f->scale > 0 ? fmin(1.75e-7 * f->scale * f->scale, 1e-8) * n : 3e-9 * n);
+    return 0.004 + (5.6e-9 + smooth_seconds(p->filter)) * n + (f->scale > 0 ? fmin(1.75e-7 * f->scale * f->scale, 1e-8) * n : 3e-9 * n);
 }
 
 static void describe(const struct frame *f, const char *in, const struct detect_params *p)
 {
-    double mb = (double)image_count(&f->im) * (f->map ? 8 : 4) / 1e6;
-    fprintf(stderr, "detect: %s: %ld x %ld pixels of %g arcsec, kernel %.3f px, gain %g, zero point %g, "
-            "about %.0f MB and %.2g s\n", in, f->im.nx, f->im.ny, f->scale, p->kernel_fwhm, p->phot.gain,
-            f->zeropoint, mb + 8, predict(f));
+    static const char *const way[] = {"none", "a Gaussian", "a row times a column", "summed as a whole", "by transforms of tiles"};
+    double mb = ((double)image_count(&f->im) * (f->map ? 8 : 4) + p->threads * smooth_bytes(p->filter, f->im.nx)) / 1e6;
+    fprintf(stderr, "detect: %s: %ld x %ld pixels of %g arcsec, kernel %d x %d (%s), gain %g, zero point %g, "
+            "about %.0f MB and %.2g s\n", in, f->im.nx, f->im.ny, f->scale, 2 * p->filter->reach + 1, 2 * p->filter->radius + 1, way[p->filter->way],
+            p->phot.gain, f->zeropoint, mb + 8, predict(f, p));
 }
 
 /* Every output can be opened: told before the work, and before one of them appears. */
@@ -507,15 +538,19 @@ static void check_options(const struct options *o, const struct opt *own, const 
         opt_idle(own, c, of_objects, "with --negative, which prints a count");
     if (o->p.negative && o->region)
         die(EXIT_USAGE, "--negative and --region: only a count is written");
+    if (o->kernel_file && opt_given(own, c, "kernel"))
+        die(EXIT_USAGE, "--kernel and --kernel-file: there is one filter: give one of them");
     if (o->p.negative)
         opt_output(c->out, OUT_LINES);
 }
 
 /* The files read, the image first. */
-static size_t list_inputs(const struct options *o, const char *image, const char *inputs[5])
+static size_t list_inputs(const struct options *o, const char *image, const char *inputs[6])
 {
-    size_t n = 0;
+    size_t n = 0, streams = 0;
     inputs[n++] = image;
+    if (o->kernel_file)
+        inputs[n++] = o->kernel_file;
     if (o->weight)
         inputs[n++] = o->weight;
     if (o->mask)
@@ -524,6 +559,10 @@ static size_t list_inputs(const struct options *o, const char *image, const char
         inputs[n++] = o->measure;
     if (o->measure_weight)
         inputs[n++] = o->measure_weight;
+    for (size_t i = 0; i < n; i++)
+        streams += strcmp(inputs[i], "-") == 0;
+    if (streams > 1)
+        die(EXIT_USAGE, "standard input can be read once only");
     return n;
 }
 
@@ -539,6 +578,8 @@ int main(int argc, char **argv)
     const struct opt own[] = {
         {.name = "kernel", .letter = 'k', .type = OPT_REAL, .value = &o.kernel, .lo = 0, .hi = 1e5, .arg = "ARCSEC",
          .help = "FWHM of the Gaussian filter, 0 none (default: PSFFWHM, else 2 pixels)"},
+        {.name = "kernel-file", .type = OPT_STR, .value = &o.kernel_file, .arg = "FILE", .in_file = 1,
+         .help = "another filter: FITS image, or text (CONV NORM or NONORM and rows of numbers)"},
         {.name = "threshold", .letter = 't', .type = OPT_REAL, .value = &o.p.threshold, .lo = 1e-6, .hi = 1e9, .arg = "K",
          .help = "detection threshold in units of the noise"},
         {.name = "threshold-noise", .type = OPT_CHOICE, .value = &o.p.pixel_noise, .choices = "filtered|pixel",
@@ -597,13 +638,16 @@ int main(int argc, char **argv)
         {0}
     };
     opt_parse(&prog, own, &c, argc, argv);
-    const char *in = c.argv[0], *inputs[5];
+    const char *in = c.argv[0], *inputs[6];
     const size_t n_inputs = list_inputs(&o, in, inputs);
     check_options(&o, own, &c);
     check_outputs(&o, c.out);
     struct frame f = {0};
     read_frame(&f, in, &o, own, &c);
     struct detect_params p = plan(&f, in, &o, own, &c);
+    struct smooth filter = {0};
+    make_filter(&filter, &f, in, &o, own, &c);
+    p.filter = &filter;
     double *diameter = calloc(o.apertures.n + 1, sizeof *diameter);
     if (!diameter)
         run(E_NOMEM, in);
@@ -616,6 +660,7 @@ int main(int argc, char **argv)
     if (!c.check)
         search(&f, &prog, own, &o, &c, &p, inputs, n_inputs);
     free(diameter);
+    smooth_free(&filter);
     free(f.map);
     free(f.other_map);
     sky_close(f.sky);

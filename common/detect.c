@@ -90,7 +90,7 @@ static int filtered_noise(const struct image *im, const struct background *b, co
 {
     double white = smooth_noise(filter);
     *result = white;
-    if (filter->radius == 0)
+    if (filter->way == SMOOTH_NOTHING)
         return OK;
     const struct mesh *m = &b->rms;
     long strips = m->my < 5 ? m->my : 4 + m->my / 16, tall = m->ny / m->my + 1, n = 0;
@@ -344,9 +344,9 @@ static int measure_all(const struct image *im, const float *map, int relative, c
     return st;
 }
 
-/* Background, noise, filter and threshold into d. */
+/* Background, noise and threshold into d. */
 static int prepare(const struct image *im, float *map, int relative, const struct detect_params *p,
-                   struct par_team *team, struct detection *d)
+                   const struct smooth *filter, struct par_team *team, struct detection *d)
 {
     struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, team, p->dark_sky};
     int st = background_measure(&d->background, im, map, &bp);
@@ -359,12 +359,9 @@ static int prepare(const struct image *im, float *map, int relative, const struc
         return st;
     if (!map && !(d->noise > 0))
         return E_SINGULAR;
-    st = smooth_new(&d->filter, p->kernel_fwhm);
-    if (st)
-        return st;
-    d->filtered_noise = smooth_noise(&d->filter);
+    d->filtered_noise = smooth_noise(filter);
     if (!p->pixel_noise)
-        st = filtered_noise(im, &d->background, map, &d->filter, p->negative, p->rms, &d->filtered_noise);
+        st = filtered_noise(im, &d->background, map, filter, p->negative, p->rms, &d->filtered_noise);
     d->threshold = p->threshold * (p->pixel_noise ? 1 : d->filtered_noise);
     return st;
 }
@@ -375,12 +372,13 @@ int detect_run(const struct image *im, float *rms_map, int relative, const struc
     struct detection out = {0};
     struct segments s = {0};
     struct blob_list all = {0};
+    const struct smooth nothing = {.noise = 1}, *filter = p->filter ? p->filter : &nothing;
     struct par_team *team = par_team_new(p->threads);
-    int st = prepare(im, rms_map, relative, p, team, &out);
+    int st = prepare(im, rms_map, relative, p, filter, team, &out);
     tick(p->progress, DETECT_STEPS / 8);
     if (!st) {
         struct segment_params sp = {out.threshold, out.noise, rms_map, p->min_area, p->negative, team};
-        st = segment_find(&s, im, &out.background, &out.filter, &sp);
+        st = segment_find(&s, im, &out.background, filter, &sp);
     }
     if (!st)
         st = separate(im, rms_map, p, team, &s, &all, &out);
@@ -403,7 +401,6 @@ void detection_free(struct detection *d)
 {
     background_free(&d->background);
     background_free(&d->measured);
-    smooth_free(&d->filter);
     free(d->object);
     free(d->aperture);
     labels_free(&d->label);

@@ -26,7 +26,7 @@ enum { DETECT_MOST = 1 << 18, DETECT_PART = 12 };
 enum weight_type { WEIGHT_INVERSE, WEIGHT_RMS, WEIGHT_VARIANCE };
 
 struct detect_params {
-    double kernel_fwhm;        /* pixels, 0: no filter */
+    const struct smooth *filter;   /* NULL: none */
     double threshold;          /* in units of the noise */
     int pixel_noise;           /* of the pixels instead of the filtered image */
     long min_area;             /* pixels */
@@ -56,7 +56,6 @@ enum { DETECT_STEPS = 1000 };
 struct detection {
     struct background background;
     struct background measured;    /* of the image of the photometry, when it is another */
-    struct smooth filter;
     double noise;              /* rms of a pixel (without a map) */
     double filtered_noise;     /* rms of the filtered image in units of the pixel's */
     double threshold;          /* in units of the pixel's rms */

@@ -6,16 +6,18 @@
  * are independent and their order fixes the result for any number of threads.
  */
 #include "segment.h"
+#include "fft.h"
 #include "grow.h"
 #include "mend.h"
 #include "pages.h"
 #include "simd.h"
+#include "tiles.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { STRIP = 128, BLOCK = 64, RETURN = 1 << 19 };
+enum { STRIP = TILES_TALL, BLOCK = 64, RETURN = 1 << 19 };
 
 /* ---- filtered rows in order ---- */
 
@@ -26,13 +28,17 @@ struct feeder {
     const struct smooth *filter;
     int negative;
     long next;             /* the row that enters the ring next */
-    float *plain;          /* ring of 2r+2 rows above background, each with r zeros at both ends: one stays behind */
-    float *across;         /* ring of 2r+2 rows filtered along x */
-    const float **window;  /* 2r+1 pointers for the column filter */
-    float *zero;           /* nx zeros */
+    long ring;             /* rows at hand: those a filtered row depends on, one stays behind; with tiles those of a tile */
+    float *plain;          /* ring of rows above background, each with zeros at both ends as far as the filter reaches */
+    float *across;         /* ring of rows filtered along x; NULL where the filter is not made of two of one axis */
+    const float **window;  /* pointers to the rows that the filter takes */
+    float *zero;           /* a row of zeros */
+    float *band;           /* with tiles: TILES_TALL filtered rows from row `banded` on */
+    double *scratch;
+    long banded;
     struct mend mend;      /* of images with bad pixels, else empty */
-    unsigned char *kind;   /* ring of 2r+2 rows, what the pixels are; NULL without bad ones */
-    float *rms;            /* ring of 2r+2 rows of the map; NULL likewise */
+    unsigned char *kind;   /* ring of rows, what the pixels are; NULL without bad ones */
+    float *rms;            /* ring of rows of the map; NULL likewise */
 };
 
 static void feeder_free(struct feeder *f)
@@ -41,6 +47,8 @@ static void feeder_free(struct feeder *f)
     free(f->across);
     free(f->window);
     free(f->zero);
+    free(f->band);
+    fft_free(f->scratch);
     mend_free(&f->mend);
     free(f->kind);
     free(f->rms);
@@ -49,19 +57,33 @@ static void feeder_free(struct feeder *f)
 /* Row y0 is filtered next. */
 static void feeder_seek(struct feeder *f, long y0)
 {
+    if (f->band)
+        y0 -= y0 % TILES_TALL;
+    f->banded = -1;
     f->next = y0 - (long)f->filter->radius;
     if (f->kind)
         mend_seek(&f->mend, f->next > 0 ? f->next : 0);
 }
 
+/* Columns of a row in the ring. */
+static size_t plain_width(const struct feeder *f)
+{
+    return (size_t)f->im->nx + 2 * (size_t)f->filter->reach;
+}
+
 static int feeder_open(struct feeder *f, long y0)
 {
-    size_t nx = (size_t)f->im->nx, r = (size_t)f->filter->radius, n = 2 * r + 2;
-    f->plain = calloc(n * (nx + 2 * r), sizeof(float));
-    f->across = malloc(n * nx * sizeof(float));
+    const enum smooth_way way = f->filter->way;
+    const int tiled = way == SMOOTH_TILES, twice = way == SMOOTH_EVEN || way == SMOOTH_PRODUCT;
+    f->ring = 2L * f->filter->radius + (tiled ? TILES_TALL + 1 : 2);
+    size_t nx = (size_t)f->im->nx, n = (size_t)f->ring;
+    f->plain = calloc(n * plain_width(f), sizeof(float));
+    f->across = twice ? malloc(n * nx * sizeof(float)) : NULL;
     f->window = malloc(n * sizeof *f->window);
-    f->zero = calloc(nx, sizeof(float));
-    int st = f->plain && f->across && f->window && f->zero ? OK : E_NOMEM;
+    f->zero = calloc(plain_width(f), sizeof(float));
+    f->band = tiled ? malloc(TILES_TALL * nx * sizeof(float)) : NULL;
+    f->scratch = tiled ? fft_alloc(tiles_room(f->filter->tiles) * sizeof(double)) : NULL;
+    int st = f->plain && (f->across || !twice) && f->window && f->zero && ((f->band && f->scratch) || !tiled) ? OK : E_NOMEM;
     if (!st && f->b->bad) {
         f->kind = malloc(n * nx);
         f->rms = f->rms_map ? malloc(n * nx * sizeof(float)) : NULL;
@@ -83,14 +105,12 @@ WIDE static void negate(long n, float *v)
 
 static size_t ring_place(const struct feeder *f, long y)
 {
-    long n = 2 * f->filter->radius + 2;
-    return (size_t)(((y % n) + n) % n);
+    return (size_t)(((y % f->ring) + f->ring) % f->ring);
 }
 
 static float *plain_row(const struct feeder *f, long y)
 {
-    size_t r = (size_t)f->filter->radius;
-    return f->plain + ring_place(f, y) * ((size_t)f->im->nx + 2 * r) + r;
+    return f->plain + ring_place(f, y) * plain_width(f) + f->filter->reach;
 }
 
 static float *across_row(const struct feeder *f, long y)
@@ -112,7 +132,7 @@ static float *rms_row(const struct feeder *f, long y)
 /* Row y above background, bad pixels bridged or 0, into the rings. */
 static void feeder_take(struct feeder *f, long y)
 {
-    long nx = f->im->nx, r = f->filter->radius;
+    long nx = f->im->nx;
     if (y < 0 || y >= f->im->ny)
         return;
     float *plain = plain_row(f, y);
@@ -122,24 +142,42 @@ static void feeder_take(struct feeder *f, long y)
         mend_row(&f->mend, plain, kind_row(f, y), rms_row(f, y));
     if (f->negative)
         negate(nx, plain);
-    if (r == 0)
-        return;
-    smooth_row(f->filter, plain, nx, across_row(f, y));
+    if (f->across)
+        smooth_row(f->filter, plain, nx, across_row(f, y));
+}
+
+/* With tiles: the rows around row y, filtered. */
+static void feeder_band(struct feeder *f, long y)
+{
+    const long r = f->filter->radius, first = y - y % TILES_TALL, last = first + TILES_TALL - 1 + r;
+    while (f->next <= last)
+        feeder_take(f, f->next++);
+    for (long i = first - r; i <= last; i++)
+        f->window[i - first + r] = i < 0 || i >= f->im->ny ? NULL : plain_row(f, i);
+    tiles_filter(f->filter->tiles, f->window, f->im->nx, f->scratch, f->band);
+    f->banded = first;
 }
 
 /* Filtered row y into out; *plain the same row unfiltered. Rows come in order. */
 static void feeder_row(struct feeder *f, long y, float *out, const float **plain)
 {
     long nx = f->im->nx, r = f->filter->radius;
+    if (f->band) {
+        if (f->banded < 0 || y >= f->banded + TILES_TALL)
+            feeder_band(f, y);
+        *plain = plain_row(f, y);
+        memcpy(out, f->band + (size_t)(y - f->banded) * (size_t)nx, (size_t)nx * sizeof(float));
+        return;
+    }
     while (f->next <= y + r)
         feeder_take(f, f->next++);
     *plain = plain_row(f, y);
-    if (r == 0) {
+    if (f->filter->way == SMOOTH_NOTHING) {
         memcpy(out, *plain, (size_t)nx * sizeof(float));
         return;
     }
     for (long j = -r; j <= r; j++)
-        f->window[j + r] = y + j < 0 || y + j >= f->im->ny ? f->zero : across_row(f, y + j);
+        f->window[j + r] = y + j < 0 || y + j >= f->im->ny ? f->zero + f->filter->reach : f->across ? across_row(f, y + j) : plain_row(f, y + j);
     smooth_column(f->filter, f->window, nx, out);
 }
 

@@ -9,6 +9,7 @@ small_chain
 printf '# DX DY\n0 0\n0.3 -1.2\n' >offsets.txt
 printf '# EXPNUM DX DY\n1 0 0\n2 .5 0\n3 .5 .5\n4 0 .5\n' >shifts.txt
 echo dith.fits >list.txt
+awk 'BEGIN { print "CONV NORM"; for (j = 0; j < 30; j++) { for (i = 0; i < 30; i++) printf "%g ", (i - 15) ^ 2 + (j - 15) ^ 2 < 200; print "" } }' >disc.conv
 ls >inputs
 
 clean_run() { # LABEL: judge the run in $st with output out, reference ref
@@ -69,6 +70,7 @@ sweep detect detect noisy.fits
 sweep rrgshape rrgshape noisy.fits cat.txt --stars stars.rrg
 sweep "rrgshape with two outputs" rrgshape noisy.fits cat.txt --stars stars.rrg --plain second
 sweep "rrgshape with a region file" rrgshape noisy.fits cat.txt --psf none --region second
+sweep "detect with a kernel" detect noisy.fits --kernel-file disc.conv
 sweep "detect with two outputs" detect noisy.fits --check-image segmentation=second
 sweep "galgen with two outputs" galgen --field 12 -n 10 --models second
 sweep "simage with two outputs" simage scene.txt --models models.txt -x 0.1 --size 60,60 --truth second

@@ -202,8 +202,10 @@ static void scales(void)
     struct detect_params p = DETECT_DEFAULTS;
     struct detection a = {0}, d = {0};
     struct rng g = rng_stream(9, 0, RNG_TEST);
-    if (image_new(&im, SIDE, SIDE))
+    struct smooth filter = {0};
+    if (image_new(&im, SIDE, SIDE) || smooth_new(&filter, 3))
         return;
+    p.filter = &filter;
     struct check c = check_begin("values times 1e20 and 1e-20");
     for (int k = 0; k < 3; k++) {
         double f = k == 0 ? 1 : k == 1 ? 1e20 : 1e-20;
@@ -213,7 +215,6 @@ static void scales(void)
         add_gauss(&im, 110, 90, 300, 3, 2, 1);
         for (uint64_t i = 0; i < SIDE * SIDE; i++)
             im.pix[i] = (float)((double)im.pix[i] * f);
-        p.kernel_fwhm = 3;
         int st = detect_run(&im, NULL, 0, &p, k ? &d : &a);
         if (st || (k && d.n != a.n)) {
             check_that(0, "scaled by %g: status %d, %zu of %zu objects", f, st, d.n, a.n);
@@ -228,6 +229,7 @@ static void scales(void)
             detection_free(&d);
     }
     check_end(&c);
+    smooth_free(&filter);
     detection_free(&a);
     image_free(&im);
 }
