@@ -2,10 +2,7 @@
  * emit.h - a scene list turned into what the renderer draws.
  *
  * Stars are points, shapelets themselves.  A Gaussian is a shapelet of order 0
- * with beta = RE / sqrt(2 ln 2).  A Sersic profile exp(-b (r/RE)^(1/n)), n >= 1/2, is
- * exactly a mixture of Gaussians (a completely monotone function of
- * r^2), here summed at 20 to 220 widths: error of the flux in any ring below 1e-3, 1e-4 from n = 0.52 on (tests/unit/test_render.c);
- * 0.5 <= n < 0.5025 is drawn as a Gaussian.
+ * with beta = RE / sqrt(2 ln 2).  A Sersic profile is a mixture of Gaussians (sersic.h).
  * Axis ratio and position angle are a shear of the round profile.
  */
 #ifndef PIXSHEAR_EMIT_H
@@ -33,12 +30,5 @@ void emission_free(struct emission *e);
 
 /* Bytes that emission_new takes, and that plan and drawing take for each emitter. E_RANGE as there. */
 MUST_CHECK int emission_bytes(const struct scene *s, double *emission, double *drawing);
-
-/*
- * Gaussians of a Sersic profile of half-light radius 1: sigma[k] and flux[k] (sum 1), at
- * most SERSIC_PARTS; returns their number, 0 when n is outside 0.5..8.
- */
-#define SERSIC_PARTS 256
-int sersic_gaussians(double n, double *sigma, double *flux);
 
 #endif

@@ -4,9 +4,9 @@
  * Error requested against error found: test_requests.c.
  */
 #include "check.h"
-#include "emit.h"
 #include "render.h"
 #include "scenes.h"
+#include "sersic.h"
 #include "shapelet.h"
 #include <stdlib.h>
 #include <string.h>
