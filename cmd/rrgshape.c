@@ -347,17 +347,6 @@ static size_t inputs_of(const struct params *p, const struct common *c, const ch
     return n;
 }
 
-/* Standard input has only one file to give. */
-static void one_standard_input(const struct params *p, const struct common *c)
-{
-    const char *name[INPUTS];
-    int standard = 0;
-    for (size_t i = 0, n = inputs_of(p, c, name); i < n; i++)
-        standard += strcmp(name[i], "-") == 0;
-    if (standard > 1)
-        die(EXIT_USAGE, "only one input can be standard input, not %d", standard);
-}
-
 /* Every output can be opened: told before the work, and before one of them appears. */
 static void outputs_ready(const struct params *p, const struct common *c)
 {
@@ -571,7 +560,6 @@ int main(int argc, char **argv)
         die(EXIT_USAGE, "--region %s: not with --stars-only, and not the output", p.region);
     if (p.plain && (p.stars_only || outfile_same(p.plain, c.out) || (p.region && outfile_same(p.plain, p.region))))
         die(EXIT_USAGE, "--plain %s: not with --stars-only, and not another output", p.plain);
-    one_standard_input(&p, &c);
     outputs_ready(&p, &c);
     outfile_together();
     struct err e;

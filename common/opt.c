@@ -488,6 +488,34 @@ static void check_names(const struct program *prog, const struct opt *own, const
     }
 }
 
+/* Files of a value that are "-"; IMAGE,CATALOGUE is two, unless one file has that name. */
+static int standard_in(const char *value)
+{
+    const char *comma = strchr(value, ',') && access(value, F_OK) ? strrchr(value, ',') : NULL;
+    if (!comma)
+        return strcmp(value, "-") == 0;
+    return (comma == value + 1 && *value == '-') + (strcmp(comma + 1, "-") == 0);
+}
+
+/* Standard input has only one file to give, be it an operand or the value of an option. */
+static void check_standard_input(const struct program *prog, const struct opt *own, const struct common *c)
+{
+    int inputs = 0;
+    for (int i = 0; i < c->argc; i++)
+        inputs += strcmp(c->argv[i], "-") == 0;
+    for (const struct opt *o = own; o->name; o++) {
+        const struct opt_strs *s = o->value;
+        if (o->in_file == 1 && o->type == OPT_STR && *(const char *const *)o->value)
+            inputs += standard_in(*(const char *const *)o->value);
+        for (size_t i = 0; o->in_file == 1 && o->type == OPT_STRS && i < s->n; i++)
+            inputs += standard_in(s->v[i]);
+    }
+    if (inputs > 1)
+        die(EXIT_USAGE, "standard input can be read once only, not as %d inputs: give files", inputs);
+    if (inputs == 1 && isatty(STDIN_FILENO))
+        die(EXIT_USAGE, "standard input is a terminal: usage: %s [OPTION]... %s", prog->name, prog->operands);
+}
+
 void opt_parse(const struct program *prog, const struct opt *own, struct common *c, int argc, char **argv)
 {
     struct parser p = {prog, own, c, argc, argv};
@@ -512,16 +540,10 @@ void opt_parse(const struct program *prog, const struct opt *own, struct common 
         die(EXIT_USAGE, "an operand is missing: usage: %s [OPTION]... %s", prog->name, prog->operands);
     if (c->argc == 0 && prog->max_operands != 0)
         c->argv[c->argc++] = "-";
-    int inputs = 0;
-    for (int i = 0; i < c->argc; i++) {
+    for (int i = 0; i < c->argc; i++)
         if (!*c->argv[i])
             die(EXIT_USAGE, "operand %d is an empty name", i + 1);
-        inputs += strcmp(c->argv[i], "-") == 0;
-    }
-    if (inputs > 1)
-        die(EXIT_USAGE, "standard input can be read once only");
-    if (inputs == 1 && isatty(STDIN_FILENO))
-        die(EXIT_USAGE, "standard input is a terminal: usage: %s [OPTION]... %s", prog->name, prog->operands);
+    check_standard_input(prog, own, c);
     check_names(prog, own, c);
 }
 

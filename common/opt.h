@@ -72,7 +72,8 @@ struct common {
  * Parse; --help and --version print and exit 0; mistakes exit 2 with one line
  * that names the nearest option.  Options and operands may be mixed; "--" ends
  * options.  Without an operand, a program whose min_operands is 0 gets "-".
- * Reading from a terminal is refused with the usage line.
+ * Reading from a terminal is refused with the usage line, standard input for two
+ * inputs (operands or options that name an input) as well.
  * `own` ends with a zero entry.
  */
 void opt_parse(const struct program *prog, const struct opt *own, struct common *c,

@@ -52,3 +52,17 @@ fails "cutcat: --flags without FLAGS_RRG" 1 cutcat bare.txt --stars stars.rrg --
 ln -s cut.txt link.txt
 fails "fom: a catalogue twice" 2 fom cut.txt cut.txt
 fails "fom: by another name" 2 fom cut.txt shapes.txt link.txt
+# standard input, asked for twice: by an operand and an option, by two options, in a pair
+once() { # COMMAND...: exit 2 before anything is read
+    fails "$* <file" 2 "$@" -o made
+    if grep -q "can be read once only" cmd.err && [ ! -e made ]; then pass "told"; else fail "$*: $(cat cmd.err)"; fi
+}
+once detect - --weight - <noisy.fits
+once detect noisy.fits --weight - --mask - <noisy.fits
+once simage --models - -x 0.1 scene.txt -p - <models.txt
+once simage --models - -x 0.1 <scene.txt
+once drizzle dith.fits --weight - --mask - <dith.fits
+once rrgshape noisy.fits - --stars stars.fits,- <cat.txt
+once rrgshape noisy.fits cat.txt --stars -,- <cat.txt
+perl "$TOP/tests/fits.pl" make mask.fits 120 120 0
+ok "once, by an option" detect noisy.fits --mask - -o masked.cat <mask.fits
