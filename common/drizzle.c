@@ -10,7 +10,7 @@
 
 #define SMALL 9.6e-7          /* a drop of this side is a point */
 #define LEAST 1e-12           /* parts of a drop below this are rounding */
-#define FWHM_SIGMA 2.3548
+#define FWHM_SIGMA 2.3548     /* of the kernel as STScI defines it: 8e-6 below 2 sqrt(2 ln 2) */
 
 /* Nearest multiple of 2^-20, |v| < 2^31. */
 static double rounded(double v)

@@ -21,6 +21,7 @@ struct fft {
     enum kind kind;
 };
 
+/* FFTW makes plans one at a time in a process. */
 static atomic_flag planner = ATOMIC_FLAG_INIT;
 
 static void lock(void)

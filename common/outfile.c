@@ -47,7 +47,8 @@ struct outfile {
 /*
  * Names that must go when the program ends or a signal ends it.  A handler has
  * no other way to know them, nor writers of one of several outputs that there
- * are others; these are the only variables at file scope in the project.
+ * are others; with the lock of FFTW's planner (fft.c) these are the only
+ * variables at file scope in the project.
  */
 static char *volatile doomed[TEMPS];
 static int watching;
