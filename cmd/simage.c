@@ -5,7 +5,6 @@
  * shapes are, about each object's origin.
  */
 #include "catkeys.h"
-#include "distort.h"
 #include "emit.h"
 #include "err.h"
 #include "exposure.h"
@@ -16,15 +15,17 @@
 #include "opt.h"
 #include "outfile.h"
 #include "pages.h"
+#include "place.h"
 #include "plan.h"
 #include "progress.h"
 #include "psf.h"
 #include "psfio.h"
 #include "render.h"
-#include "scene.h"
+#include "scenelist.h"
 #include "sky.h"
 #include "table.h"
 #include "tableio.h"
+#include "tally.h"
 #include "truth.h"
 #include <math.h>
 #include <stdio.h>
@@ -33,6 +34,8 @@
 #include <time.h>
 
 #define FIELD_MARGIN 26.0      /* arcsec around the field of --method field */
+#define BASE_MB 12             /* what --check adds for program, libraries, PSF and the rows being drawn */
+#define BLOCK 16384            /* objects, or Gaussians of their profiles, that are planned and drawn together */
 
 /* What the user asks for. */
 struct request {
@@ -54,15 +57,16 @@ struct request {
 
 /* Everything read. */
 struct input {
-    struct table list, catalogue;
+    struct scene_list list;
+    struct table catalogue;
     struct models models;
-    struct scene scene;
     struct otf otf;
     struct psf_info psf;
     double fwhm;             /* of PSF, jitter and diffusion, arcsec; NaN without a PSF */
     struct header wcs;       /* of --wcs, and the size of its image */
-    struct sky *sky;
     long nx, ny;
+    struct place place;
+    struct truth *truth;
 };
 
 static void check(int st)
@@ -105,43 +109,27 @@ static void check_options(const struct request *r, const struct opt *own, const 
 
 /* ---- input ---- */
 
-/* Bytes of the list in memory. */
-static double list_bytes(const struct table *t)
-{
-    return 8.0 * (double)t->nrow * (double)(t->ncol + 1);
-}
-
 static void check_memory(double bytes, const char *name, const struct common *c)
 {
     if (bytes > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", name, 1e-6 * bytes);
 }
 
-/* What objects, their parts and the image will take, refused before it is taken; the list stays for --truth alone. */
-static void check_objects(const struct input *in, const struct request *r, const struct view *v, const struct common *c)
+static void must(int st, const struct err *e)
 {
-    const double n = (double)in->scene.n, list = r->truth ? list_bytes(&in->list) : 0;
-    double parts, drawing;
-    if (emission_bytes(&in->scene, &parts, &drawing))
-        die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
-    const double making = list + n * (double)(sizeof(struct object) + (r->wcs ? 6 : 2) * sizeof(double)) + parts;
-    check_memory(fmax(making, parts + drawing + 4.0 * (double)v->nx * (double)v->ny), c->argv[0], c);
+    if (st)
+        die(EXIT_RUN, "%s", e->text);
 }
 
+/* The list's header and the models. */
 static void read_scene(struct input *in, const struct request *r, const struct common *c)
 {
     struct err e;
-    const char *name = c->argv[0];
-    if (table_read(&in->list, name, c->max_memory, &e))
-        die(EXIT_RUN, "%s", e.text);
-    if (r->models) {
-        if (table_read(&in->catalogue, r->models, c->max_memory, &e)
-            || models_open(&in->models, &in->catalogue, r->models, &e))
-            die(EXIT_RUN, "%s", e.text);
-    }
-    check_memory(list_bytes(&in->list) + (double)in->list.nrow * (double)sizeof(struct object), name, c);
-    if (scene_open(&in->scene, &in->list, r->models ? &in->models : NULL, r->zeropoint, name, &e))
-        die(EXIT_RUN, "%s", e.text);
+    must(scene_list_open(&in->list, c->argv[0], c->max_memory, &e), &e);
+    if (!r->models)
+        return;
+    must(table_read(&in->catalogue, r->models, c->max_memory, &e), &e);
+    must(models_open(&in->models, &in->catalogue, r->models, &e), &e);
 }
 
 /* The PSF; its response, ready for a view. */
@@ -174,6 +162,7 @@ static void read_psf(struct input *in, const struct request *r, const struct com
         in->fwhm = in->psf.fwhm;
     else if (in->otf.n > 0 && psf_fwhm(&in->otf, v->diffusion, 0, &in->fwhm))
         in->fwhm = NAN;
+    otf_keep_spline(&in->otf);             /* all that plans need */
 }
 
 /* The WCS of --wcs, which must have the pixels that -x says. */
@@ -194,10 +183,10 @@ static void read_wcs(struct input *in, const struct request *r, const struct com
     if (fits_in_header(f, i, &h, &e))
         die(EXIT_RUN, "%s", e.text);
     fits_in_close(f);
-    if (sky_open(&in->sky, &h, &e))
+    if (sky_open(&in->place.sky, &h, &e))
         die(EXIT_RUN, "%s: %s", r->wcs, e.text);
-    if (!(fabs(sky_scale(in->sky) / r->pixel - 1) < 0.1))
-        die(EXIT_RUN, "%s: its WCS has pixels of %.6g\": give -x %.6g, not %g", r->wcs, sky_scale(in->sky), sky_scale(in->sky), r->pixel);
+    if (!(fabs(sky_scale(in->place.sky) / r->pixel - 1) < 0.1))
+        die(EXIT_RUN, "%s: its WCS has pixels of %.6g\": give -x %.6g, not %g", r->wcs, sky_scale(in->place.sky), sky_scale(in->place.sky), r->pixel);
     check(exposure_copy_wcs(&in->wcs, &h));
     header_free(&h);
 }
@@ -211,7 +200,7 @@ static void set_size(const struct input *in, const struct request *r, const char
         side[1] = (double)in->ny;
     } else if (!(side[0] > 0)) {
         struct err e;
-        if (catkeys_number(&in->list, "FIELD", &field, &e))
+        if (catkeys_number(&in->list.table, "FIELD", &field, &e))
             die(EXIT_RUN, "%s: %s", name, e.text);
         if (!(field > 0))
             die(EXIT_USAGE, "%s: no keyword FIELD: give --size NX,NY in output pixels", name);
@@ -228,7 +217,7 @@ static void set_size(const struct input *in, const struct request *r, const char
 static int describe(struct header *h, const struct input *in, const struct request *r, const struct view *v)
 {
     int st = header_set_str(h, "BUNIT", "electron", "expected electrons per pixel");
-    const char *seed = table_text(&in->list, "SEED");
+    const char *seed = table_text(&in->list.table, "SEED");
     const struct { const char *key; double value; const char *what; } card[] = {
         {"EXPTIME", r->exptime, "exposure time, s"},
         {"GAIN", 1, "electron per BUNIT"},
@@ -274,79 +263,44 @@ static int describe(struct header *h, const struct input *in, const struct reque
     return st;
 }
 
-/* Pixel positions of the objects, from the first centre = 0. */
-static void positions(const struct input *in, const struct view *v, const struct header *h, double *x, double *y)
+/* Where objects are: by the WCS of the image, h, or through that of --wcs. */
+static void find_places(struct input *in, const struct request *r, const struct view *v, const struct header *h)
 {
-    const struct scene *s = &in->scene;
-    for (size_t i = 0; i < s->n; i++) {
-        x[i] = s->object[i].x;
-        y[i] = s->object[i].y;
-        if (s->where == SCENE_FIELD) {
-            x[i] = 0.5 * ((double)v->nx - 1) + x[i] / v->pixel;
-            y[i] = 0.5 * ((double)v->ny - 1) + y[i] / v->pixel;
-        } else if (s->where == SCENE_PIXEL) {
-            x[i] -= 1;
-            y[i] -= 1;
-        }
-    }
-    if (s->where != SCENE_SKY || s->n == 0)
-        return;
-    struct sky *sky;
+    struct place *p = &in->place;
     struct err e;
-    if (sky_open(&sky, h, &e))
-        die(EXIT_RUN, "%s", e.text);
-    int st = sky_to_pixel(sky, s->n, x, y, x, y);      /* positions behind the sky are NaN: counted by the plan */
-    if (st && st != E_RANGE)
-        check(st);
-    sky_close(sky);
-}
-
-/* Pixel positions through the WCS of --wcs, and the maps of shapes that go with them. */
-static void through_wcs(struct input *in, const struct request *r, const struct view *v, double *x, double *y, double (*map)[4])
-{
-    const struct scene *s = &in->scene;
-    double centre[2] = {r->centre[0], r->centre[1]};
     const double mid[2] = {0.5 * ((double)v->nx - 1), 0.5 * ((double)v->ny - 1)};
-    if (isnan(centre[0]) && sky_from_pixel(in->sky, 1, &mid[0], &mid[1], &centre[0], &centre[1]))
+    p->view = v;
+    p->maps = r->wcs != NULL;
+    p->centre[0] = r->centre[0];
+    p->centre[1] = r->centre[1];
+    if (!p->maps)
+        must(sky_open(&p->sky, h, &e), &e);
+    else if (isnan(p->centre[0]) && sky_from_pixel(p->sky, 1, &mid[0], &mid[1], &p->centre[0], &p->centre[1]))
         die(EXIT_RUN, "%s: the middle of the image has no place on the sky: give --center", r->wcs);
-    for (size_t i = 0; i < s->n; i++) {
-        x[i] = s->object[i].x - (s->where == SCENE_PIXEL);
-        y[i] = s->object[i].y - (s->where == SCENE_PIXEL);
-    }
-    check(distort(in->sky, centre, s->where, v->pixel, s->n, x, y, map));
-    for (size_t i = 0; i < s->n && (v->g1 != 0 || v->g2 != 0); i++)
-        check(distort_before((double[]){v->g1, v->g2}, map[i]));
 }
 
 /* ---- plan ---- */
 
-static void print_plan(FILE *f, const struct plan *p, const struct request *r)
+static void print_plan(FILE *f, const struct tally *t, const struct view *v, const struct request *r)
 {
     static const char *const path[PATH_COUNT] = {"outside or dark", "points", "closed-form pixels",
                                                  "mapped pixels (Gauss-Legendre)", "Fourier stamps", "larger than stamps"};
-    const struct view *v = &p->view;
-    fprintf(f, "simage: %ld x %ld pixels of %g\", %zu parts\n", v->nx, v->ny, v->pixel, p->n);
+    fprintf(f, "simage: %ld x %ld pixels of %g\", %zu parts\n", v->nx, v->ny, v->pixel, t->n);
     fprintf(f, "simage: effects:%s%s%s%s%s%s%s\n", v->psf ? " PSF" : "", r->diffusion > 0 ? " diffusion" : "",
             r->jitter > 0 ? " jitter" : "", r->ipc > 0 ? " IPC" : "", v->no_pixel ? "" : " pixel", r->shear[0] != 0 || r->shear[1] != 0 ? " shear" : "",
             r->wcs ? " distortion" : "");
     for (int i = 0; i < PATH_COUNT; i++)
-        if (p->count[i])
-            fprintf(f, "simage: %zu %s\n", p->count[i], path[i]);
-    for (int g = 0; g < p->n_grid; g++) {
-        const struct stamp_grid *t = &p->grid[g];
-        size_t n = 0, broad = 0;
-        for (size_t i = 0; i < p->n; i++) {
-            n += p->draw[i].path == PATH_FOURIER && p->draw[i].grid == g;
-            broad += p->draw[i].path == PATH_BROAD && p->draw[i].grid == g;
-        }
-        if (broad)
-            fprintf(f, "simage: %zu in a period of %g\", %d frequencies per axis\n", broad, t->n * t->pixel, 2 * t->kmax + 1);
+        if (t->count[i])
+            fprintf(f, "simage: %zu %s\n", t->count[i], path[i]);
+    for (int g = 0; g < t->n_grid; g++) {
+        const struct tally_grid *s = &t->grid[g];
+        if (s->broad)
+            fprintf(f, "simage: %zu in a period of %g\", %d frequencies per axis\n", s->n, s->pixels * v->pixel, s->frequencies);
         else
-            fprintf(f, "simage: %zu stamps of %d x %d, %d frequencies per axis\n", n, t->n, t->n, 2 * t->kmax + 1);
+            fprintf(f, "simage: %zu stamps of %g x %g, %d frequencies per axis\n", s->n, s->pixels, s->pixels, s->frequencies);
     }
     fprintf(f, "simage: accuracy %g of the peak, floor %g electron; %zu transforms, %d shear matrices; about %.2g s and %.0f MB\n",
-            p->acc.eps, p->acc.floor, p->fft_plans, p->n_matrix, p->cost,
-            1e-6 * (p->bytes + 4.0 * (double)v->nx * (double)v->ny) + 8);
+            r->accuracy.eps, r->accuracy.floor, t->fft_plans, t->n_matrix, t->cost, 1e-6 * t->bytes + BASE_MB);
 }
 
 static void report(size_t bad, size_t cut, const struct common *c)
@@ -360,62 +314,117 @@ static void report(size_t bad, size_t cut, const struct common *c)
         warn("%s: %zu stamps are too small for --accuracy: wings beyond fold back", c->argv[0], cut);
 }
 
-static void make_plan(struct plan *p, const struct view *v, const struct request *r, const struct common *c,
-                      const struct emission *e)
+static double image_bytes(const struct view *v)
 {
-    int st = scene_plan(p, v, &r->accuracy, e->n, e->emitter);
+    return 4.0 * (double)v->nx * (double)v->ny;
+}
+
+static void make_plan(struct plan *p, const struct view *v, const struct request *r, const struct common *c,
+                      const struct emission *block)
+{
+    int st = scene_plan(p, v, &r->accuracy, block->n, block->emitter);
     if (st == E_RANGE)
         die(EXIT_RUN, "%s: the PSF's cut-off and the pixels do not fit: fewer than 64 bands are possible", r->psf ? r->psf : "-");
     check(st);
-    check_memory(p->bytes + (double)e->n * (double)(sizeof *e->emitter + sizeof *e->coef + RENDER_BYTES) + 4.0 * (double)v->nx * (double)v->ny,
-                 c->argv[0], c);
-    if (c->check || c->verbose)
-        print_plan(stderr, p, r);
-    report(p->n_bad, p->n_short, c);
+    p->bytes += (double)block->n * (double)(sizeof *block->emitter + sizeof *block->coef + RENDER_BYTES) + image_bytes(v);
+    check_memory(p->bytes, c->argv[0], c);
 }
 
-static void draw(const struct plan *p, struct image *im, const struct common *c)
+/* ---- drawing ---- */
+
+static void next_block(struct input *in, const struct request *r, struct emission *block)
 {
-    struct progress bar;
-    size_t todo = p->n - p->count[PATH_NONE];
+    const struct scene_use use = {.models = r->models ? &in->models : NULL, .zeropoint = r->zeropoint, .exptime = r->exptime,
+                                  .place = &in->place, .truth = in->truth};
+    struct err e;
+    must(scene_list_next(&in->list, &use, block, &e), &e);
+}
+
+/* Seconds that it took. */
+static double draw(const struct plan *p, struct image *im, const struct common *c, struct progress *bar)
+{
     struct timespec begin, end;
-    progress_begin(&bar, "simage", (long)todo, c->quiet);
     timespec_get(&begin, TIME_UTC);
-    int st = scene_render(p, im, c->threads, &bar);
+    int st = scene_render(p, im, c->threads, bar);
     timespec_get(&end, TIME_UTC);
-    progress_end(&bar);
     check(st);
-    if (c->verbose)
-        fprintf(stderr, "simage: drawn in %.3f s\n", difftime(end.tv_sec, begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec));
+    progress_tick(bar, (long)p->count[PATH_NONE]);
+    return difftime(end.tv_sec, begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
+}
+
+/* A stamp for each object, block by block. */
+static void draw_stamps(struct input *in, const struct view *v, const struct request *r, const struct common *c,
+                        struct emission *block, struct image *im)
+{
+    struct tally tally = {0};
+    struct progress bar;
+    double seconds = 0;
+    int last;
+    next_block(in, r, block);
+    progress_begin(&bar, "simage", in->list.end ? (long)block->n : -1, c->quiet || c->check);
+    do {
+        struct plan plan;
+        make_plan(&plan, v, r, c, block);
+        tally_add(&tally, &plan);
+        last = in->list.end;
+        if (last && (c->check || c->verbose))
+            print_plan(stderr, &tally, v, r);
+        if (last)
+            report(tally.n_bad, tally.n_short, c);
+        if (last && !plan.lean)
+            otf_free(&in->otf);            /* the plan holds its own tables */
+        if (!c->check)
+            seconds += draw(&plan, im, c, &bar);
+        plan_free(&plan);
+        progress_part(&bar, scene_list_part(&in->list));
+        if (!last)
+            next_block(in, r, block);
+    } while (!last);
+    progress_end(&bar);
+    if (c->verbose && !c->check)
+        fprintf(stderr, "simage: drawn in %.3f s\n", seconds);
 }
 
 /* The whole scene in one convolution; in place of a plan of stamps. */
-static void draw_field(const struct view *v, const struct request *r, const struct common *c, const struct emission *e,
+static void draw_field(struct input *in, const struct view *v, const struct request *r, const struct common *c, struct emission *block,
                        struct image *im)
 {
     struct field f;
+    struct field_sum sum = {0};
     struct progress bar;
-    struct field_losses lost = {0, 0};
+    size_t n = 0;
+    int last;
     if (field_plan(&f, v, FIELD_MARGIN))
         die(EXIT_RUN, "%s: the field is too large for one convolution: leave --method field out", c->argv[0]);
-    if (c->check || c->verbose)
-        fprintf(stderr, "simage: one convolution of %ld x %ld pixels of %g\", blurred by %.4f\"; about %.2g s and %.0f MB\n", (long)f.nx * f.split,
-                (long)f.ny * f.split, v->pixel / f.split, f.sigma, f.cost + 2e-5 * (double)e->n, 1e-6 * f.bytes);
-    if (f.bytes > c->max_memory)
-        die(EXIT_RUN, "%s: needs %.0f MB, more than --max-memory", c->argv[0], 1e-6 * f.bytes);
+    check_memory(f.bytes, c->argv[0], c);
+    if (!c->check)
+        check(field_begin(&sum, &f, v));
+    next_block(in, r, block);
+    progress_begin(&bar, "simage", in->list.end ? (long)block->n : -1, c->quiet || c->check);
+    do {
+        last = in->list.end;
+        n += block->n;
+        if (last && (c->check || c->verbose))
+            fprintf(stderr, "simage: one convolution of %ld x %ld pixels of %g\", blurred by %.4f\"; about %.2g s and %.0f MB\n", (long)f.nx * f.split,
+                    (long)f.ny * f.split, v->pixel / f.split, f.sigma, f.cost + 2e-5 * (double)n, 1e-6 * f.bytes);
+        if (!c->check)
+            check(field_add(&sum, &r->accuracy, block->n, block->emitter, im, c->threads, &bar));
+        progress_part(&bar, scene_list_part(&in->list));
+        if (!last)
+            next_block(in, r, block);
+    } while (!last);
+    progress_end(&bar);
     if (c->check)
         return;
-    progress_begin(&bar, "simage", (long)e->n, c->quiet);
-    int st = field_render(&f, v, &r->accuracy, e->n, e->emitter, im, c->threads, &bar, &lost);
-    progress_end(&bar);
-    check(st);
-    report(lost.bad, lost.cut, c);
+    check(field_end(&sum, im));
+    report(sum.lost.bad, sum.lost.cut, c);
 }
 
 /* New pixels; the header stays. */
-static void make_image(struct image *im, const struct view *v)
+static void make_image(struct image *im, const struct view *v, const struct common *c)
 {
     struct header h = im->hdr;
+    check_memory(image_bytes(v), c->argv[0], c);
     check(image_new(im, v->nx, v->ny));
     im->hdr = h;
 }
@@ -430,25 +439,27 @@ static void all_inputs(const struct request *r, const struct common *c, const ch
 }
 
 /* Both outputs can be opened: told before the scene is drawn. */
-static void check_outputs(const struct request *r, const struct common *c)
+static void check_outputs(const struct request *r, const struct common *c, const char *inputs[4])
 {
-    const char *inputs[4];
     struct err e;
-    all_inputs(r, c, inputs);
     if (!c->check && (outfile_ready(c->out, inputs, 4, &e) || (r->truth && outfile_ready(r->truth, inputs, 4, &e))))
         die(EXIT_RUN, "%s", e.text);
 }
 
 /* What is in the image, beside it. */
-static void write_truth(struct input *in, const struct request *r, const struct common *c, const struct header *h,
-                        const double *x, const double *y, const char *record)
+static void open_truth(struct input *in, const struct request *r, const char *inputs[4], const struct header *h, const char *record)
 {
-    const char *inputs[4];
     struct err e;
-    all_inputs(r, c, inputs);
-    check(truth_add(&in->list, &in->scene, h, x, y, r->exptime));
-    if (table_write(&in->list, r->truth, record, inputs, 4, &e))
-        die(EXIT_RUN, "%s", e.text);
+    must(truth_open(&in->truth, &in->list.table, h, in->place.sky, r->truth, record, inputs, 4, &e), &e);
+}
+
+static void write_all(struct input *in, struct image *im, const struct common *c, const char *inputs[4], const char *record)
+{
+    struct err e;
+    if (in->truth)
+        must(truth_close(in->truth, &e), &e);
+    must(image_write(im, c->out, record, inputs, 4, &e), &e);
+    must(outfile_appear(&e), &e);
 }
 
 static void run(const struct request *r, const struct common *c, const char *record)
@@ -457,68 +468,32 @@ static void run(const struct request *r, const struct common *c, const char *rec
     struct view v = {.pixel = r->pixel / (double)r->subpixel, .no_pixel = r->no_pixel, .g1 = r->shear[0], .g2 = r->shear[1],
                      .shear_order = r->order};
     struct image im = {0};
-    struct emission emission = {0};
-    struct plan plan = {0};
-    struct err e;
-    check_outputs(r, c);
+    struct emission block;
+    const char *inputs[4];
+    all_inputs(r, c, inputs);
+    check_outputs(r, c, inputs);
     outfile_together();
     read_scene(&in, r, c);
     read_psf(&in, r, c, &v);
     read_wcs(&in, r, c);
     set_size(&in, r, c->argv[0], &v);
     check(describe(&im.hdr, &in, r, &v));
-    check_objects(&in, r, &v, c);
-    const int keep = r->truth && !c->check;
-    if (!keep)
-        table_free(&in.list);
-
-    double *x = malloc((2 * in.scene.n + 1) * sizeof *x);
-    double (*map)[4] = r->wcs ? malloc((in.scene.n + 1) * sizeof *map) : NULL;
-    if (!x || (r->wcs && !map))
-        check(E_NOMEM);
-    if (map)
-        through_wcs(&in, r, &v, x, x + in.scene.n, map);
-    else
-        positions(&in, &v, &im.hdr, x, x + in.scene.n);
-    int st = emission_new(&emission, &in.scene, &in.models, x, x + in.scene.n, map, r->exptime);
-    if (st == E_RANGE)
-        die(EXIT_RUN, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", c->argv[0]);
-    check(st);
-    if (!keep)
-        scene_free(&in.scene);
-    if (!r->whole)
-        make_plan(&plan, &v, r, c, &emission);
-    if (keep)
-        write_truth(&in, r, c, &im.hdr, x, x + in.scene.n, record);
-    scene_free(&in.scene);
-    table_free(&in.list);
-    free(x);
-    free(map);
-    sky_close(in.sky);
+    find_places(&in, r, &v, &im.hdr);
     header_free(&in.wcs);
-    if (r->whole) {
-        if (!c->check)
-            make_image(&im, &v);
-        draw_field(&v, r, c, &emission, &im);
-    }
-    if (plan.lean)                     /* a plan holds its own tables, or some of its stamps need the spline */
-        otf_keep_spline(&in.otf);
-    else
-        otf_free(&in.otf);
-    if (!r->whole && !c->check) {
-        make_image(&im, &v);
-        draw(&plan, &im, c);
-    }
+    check(emission_new(&block, BLOCK));
     if (!c->check) {
-        const char *inputs[4];
-        all_inputs(r, c, inputs);
-        if (image_write(&im, c->out, record, inputs, 4, &e) || outfile_appear(&e))
-            die(EXIT_RUN, "%s", e.text);
+        make_image(&im, &v, c);
+        if (r->truth)
+            open_truth(&in, r, inputs, &im.hdr, record);
     }
-    plan_free(&plan);
-    emission_free(&emission);
-    image_free(&im);
+    (r->whole ? draw_field : draw_stamps)(&in, &v, r, c, &block, &im);
+    emission_free(&block);
+    scene_list_close(&in.list);
     otf_free(&in.otf);
+    if (!c->check)
+        write_all(&in, &im, c, inputs, record);
+    sky_close(in.place.sky);
+    image_free(&im);
     models_free(&in.models);
     table_free(&in.catalogue);
 }

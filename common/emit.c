@@ -1,6 +1,5 @@
 /* emit.c - a scene list turned into what the renderer draws. */
 #include "emit.h"
-#include "render.h"
 #include "sersic.h"
 #include "shear.h"
 #include <math.h>
@@ -35,108 +34,86 @@ static void bend(struct emitter *to, const double map[4])
     to->g2 = p.g[1];
 }
 
-/* n Gaussians of width sigma (units of RE) for a round object. */
-static int emit_round(struct emission *e, const struct object *o, struct emitter base, int n, const double *sigma,
-                      const double *flux, const double *map, double *coef)
+/* Gaussians of a round object, of width 1 and flux 1. */
+struct round {
+    int n;
+    double index;          /* of the Sersic profile that sigma and flux are of; NaN: none yet */
+    double sigma[SERSIC_PARTS], flux[SERSIC_PARTS];
+};
+
+static int round_parts(struct round *r, const struct object *o)
+{
+    const double index = o->type == OBJECT_GAUSS ? 0.5 : o->n;
+    if (index == r->index)
+        return OK;
+    r->index = index;
+    r->n = sersic_gaussians(index, r->sigma, r->flux);
+    return r->n ? OK : E_RANGE;
+}
+
+/* Append the parts of a round object. */
+static void emit_round(struct emission *e, const struct object *o, struct emitter base, const struct round *r, const double *map)
 {
     double g[2];
     int st = round_shear(o, g);
-    for (int k = 0; k < n; k++) {
-        struct emitter *to = &e->emitter[e->n++];
+    for (int k = 0; k < r->n; k++, e->n++) {
+        struct emitter *to = &e->emitter[e->n];
         *to = base;
-        to->beta = sigma[k] * o->re;
-        to->flux = base.flux * flux[k];
+        to->beta = r->sigma[k] * o->re;
+        to->flux = base.flux * r->flux[k];
         to->g1 = st ? NAN : g[0];
         to->g2 = st ? NAN : g[1];
         if (map)
             bend(to, map);
         to->rotation = 0;
         to->parity = 1;
-        to->parts = (short)(k ? 0 : n);
-        coef[k] = 1 / (2 * sqrt(M_PI) * to->beta);
-        to->coef = &coef[k];
+        to->parts = (short)(k ? 0 : r->n);
+        e->coef[e->n] = 1 / (2 * sqrt(M_PI) * to->beta);
+        to->coef = &e->coef[e->n];
     }
-    return n;
 }
 
-static int round_parts(const struct object *o, double *sigma, double *flux)
+int emission_new(struct emission *e, size_t room)
 {
-    if (o->type == OBJECT_GAUSS) {
-        sigma[0] = SIGMA_PER_RE;
-        flux[0] = 1;
-        return 1;
-    }
-    return sersic_gaussians(o->n, sigma, flux);
-}
-
-/* Number of emitters of every object, or an error. */
-static int count_parts(const struct scene *s, size_t *total)
-{
-    double sigma[SERSIC_PARTS], flux[SERSIC_PARTS], last = NAN;
-    int parts = 0;
-    *total = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        const struct object *o = &s->object[i];
-        if (o->type == OBJECT_SERSIC && o->n != last) {
-            parts = sersic_gaussians(o->n, sigma, flux);
-            last = o->n;
-            if (parts == 0)
-                return E_RANGE;
-        }
-        *total += o->type == OBJECT_SERSIC ? (size_t)parts : 1;
-    }
-    return OK;
-}
-
-int emission_bytes(const struct scene *s, double *emission, double *drawing)
-{
-    size_t total = 0;
-    int st = count_parts(s, &total);
-    if (st)
-        return st;
-    *emission = (double)total * (double)(sizeof(struct emitter) + sizeof(double));
-    *drawing = (double)total * (double)(sizeof(struct draw) + RENDER_BYTES);
-    return OK;
-}
-
-int emission_new(struct emission *e, const struct scene *s, const struct models *m, const double *x,
-                 const double *y, double (*map)[4], double exptime)
-{
-    size_t total = 0, used = 0;
-    int st = count_parts(s, &total);
-    if (st)
-        return st;
-    struct emission made = {.emitter = calloc(total + 1, sizeof *made.emitter), .coef = malloc((total + 1) * sizeof(double))};
+    struct emission made = {.room = room, .emitter = malloc((room + 1) * sizeof *made.emitter), .coef = malloc((room + 1) * sizeof(double))};
     if (!made.emitter || !made.coef) {
         emission_free(&made);
         return E_NOMEM;
     }
-    double sigma[SERSIC_PARTS], flux[SERSIC_PARTS], last = NAN;
-    int parts = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        const struct object *o = &s->object[i];
-        struct emitter base = {.x = x[i], .y = y[i], .flux = o->flux * exptime, .parity = o->parity, .rotation = o->rot,
+    *e = made;
+    return OK;
+}
+
+int emission_add(struct emission *e, size_t *next, const struct scene *s, const struct models *m, const double *x,
+                 const double *y, double (*map)[4], double exptime)
+{
+    struct round r = {.index = NAN};
+    for (; *next < s->n; ++*next) {
+        const struct object *o = &s->object[*next];
+        const int is_round = o->type == OBJECT_GAUSS || o->type == OBJECT_SERSIC;
+        struct emitter base = {.x = x[*next], .y = y[*next], .flux = o->flux * exptime, .parity = o->parity, .rotation = o->rot,
                                .dilation = o->dilation, .g1 = o->g1, .g2 = o->g2, .parts = 1};
+        if (is_round && round_parts(&r, o))
+            return E_RANGE;
+        if (e->n + (is_round ? (size_t)r.n : 1) > e->room)
+            return OK;
+        if (is_round) {
+            emit_round(e, o, base, &r, map ? map[*next] : NULL);
+            continue;
+        }
         if (o->type == OBJECT_STAR) {
             base.dilation = 1;
             base.parity = 1;
             base.rotation = base.g1 = base.g2 = 0;
-        } else if (o->type == OBJECT_SHAPELET) {
+        } else {
             base.beta = m->beta[o->model];
             base.nmax = m->nmax[o->model];
             base.coef = m->coef + m->offset[o->model];
             if (map)
-                bend(&base, map[i]);
-        } else {
-            if (o->type == OBJECT_GAUSS || o->n != last)
-                parts = round_parts(o, sigma, flux);
-            last = o->type == OBJECT_GAUSS ? NAN : o->n;
-            used += (size_t)emit_round(&made, o, base, parts, sigma, flux, map ? map[i] : NULL, made.coef + used);
-            continue;
+                bend(&base, map[*next]);
         }
-        made.emitter[made.n++] = base;
+        e->emitter[e->n++] = base;
     }
-    *e = made;
     return OK;
 }
 

@@ -14,21 +14,22 @@
 #include "scene.h"
 
 struct emission {
-    size_t n;
+    size_t n, room;
     struct emitter *emitter;
-    double *coef;          /* of the Gaussians */
+    double *coef;          /* coef[k]: of emitter[k] when that is a Gaussian */
 };
 
-/*
- * x[i], y[i]: pixel positions (centre of the first is 0) of the objects of s.  exptime in s.
- * map, or NULL: a matrix for each object that acts on its shape after its own shear (distort.h); stars are
- * points and stay points.  Coefficients of shapelets stay in m.  E_RANGE: a Sersic index outside 0.5..8; E_NOMEM.
- */
-MUST_CHECK int emission_new(struct emission *e, const struct scene *s, const struct models *m, const double *x,
-                            const double *y, double (*map)[4], double exptime);
+/* Room for so many emitters. E_NOMEM. */
+MUST_CHECK int emission_new(struct emission *e, size_t room);
 void emission_free(struct emission *e);
 
-/* Bytes that emission_new takes, and that plan and drawing take for each emitter. E_RANGE as there. */
-MUST_CHECK int emission_bytes(const struct scene *s, double *emission, double *drawing);
+/*
+ * Append objects *next, *next + 1, ... of s as long as there is room for all parts of one (SERSIC_PARTS at most); *next
+ * becomes the first that was left.  x[i], y[i]: pixel positions (centre of the first is 0).  exptime in s.
+ * map, or NULL: a matrix for each object that acts on its shape after its own shear (distort.h); stars are
+ * points and stay points.  Coefficients of shapelets stay in m.  E_RANGE: a Sersic index outside 0.5..8.
+ */
+MUST_CHECK int emission_add(struct emission *e, size_t *next, const struct scene *s, const struct models *m, const double *x,
+                            const double *y, double (*map)[4], double exptime);
 
 #endif

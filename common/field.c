@@ -39,10 +39,32 @@ static int flat(struct otf *t, double ucut)
     return otf_sample(t, 1, 1, &one, 0.25 / ucut, 0, 0, ucut);
 }
 
-/* The objects, blurred, as samples times area on the fine grid; large[i] = 1 for those too large for it, which are left out. */
-static int blurred(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
-                   struct image *fine, int threads, struct progress *bar, unsigned char *large, struct field_losses *lost)
+int field_begin(struct field_sum *s, const struct field *f, const struct view *v)
 {
+    *s = (struct field_sum){.f = f, .v = v};
+    return image_new(&s->fine, (long)f->nx * f->split, (long)f->ny * f->split);
+}
+
+/* The fine grid as an image to be made, of objects that `one` and the Gaussian alone blur. */
+static struct view fine_view(const struct field_sum *s, const struct otf *one)
+{
+    struct view w = *s->v;
+    w.nx = s->fine.nx;
+    w.ny = s->fine.ny;
+    w.pixel = s->v->pixel / s->f->split;
+    w.no_pixel = 1;
+    w.psf = one;
+    w.diffusion = s->f->sigma;
+    w.ipc = 0;
+    w.edge[0] = w.edge[1] = 0;
+    return w;
+}
+
+/* The objects, blurred, as samples times area to the fine grid; large[i] = 1 for those too large for it, which are left out. */
+static int blurred(struct field_sum *s, const struct accuracy *a, size_t n, const struct emitter *e, int threads, struct progress *bar,
+                   unsigned char *large)
+{
+    const struct field *f = s->f;
     struct otf one = {0};
     struct plan p = {0};
     struct accuracy own = *a;
@@ -57,31 +79,23 @@ static int blurred(const struct field *f, const struct view *v, const struct acc
         moved[i].x = (e[i].x + f->x0) * f->split;
         moved[i].y = (e[i].y + f->y0) * f->split;
     }
-    struct view w = *v;
-    w.nx = (long)f->nx * f->split;
-    w.ny = (long)f->ny * f->split;
-    w.pixel = v->pixel / f->split;
-    w.no_pixel = 1;
-    w.psf = &one;
-    w.diffusion = f->sigma;
-    w.ipc = 0;
-    w.edge[0] = w.edge[1] = 0;
+    const struct view w = fine_view(s, &one);
     own.eps = fmax(0.1 * a->eps, 1e-11);
     own.floor = 0.1 * a->floor / ((double)f->split * f->split);
     own.side_max = (int)fmin(own.side_max, 2 * f->margin / w.pixel);
     st = scene_plan(&p, &w, &own, n, moved);
     if (st == OK) {
-        *lost = (struct field_losses){p.n_bad, p.n_short};
-        st = image_new(fine, w.nx, w.ny);
+        s->lost.bad += p.n_bad;
+        s->lost.cut += p.n_short;
     }
     for (size_t i = 0; st == OK && i < n; i++)
         if (p.draw[i].path == PATH_BROAD || p.draw[i].grid < 0) {
             large[i] = 1;
-            lost->bad -= p.draw[i].path == PATH_NONE;   /* refused on the fine grid only, perhaps */
+            s->lost.bad -= p.draw[i].path == PATH_NONE;   /* refused on the fine grid only, perhaps */
             p.draw[i].path = PATH_NONE;
         }
     if (st == OK)
-        st = scene_render(&p, fine, threads, bar);
+        st = scene_render(&p, &s->fine, threads, bar);
     plan_free(&p);
     otf_free(&one);
     free(moved);
@@ -194,8 +208,8 @@ static int convolve(const struct field *f, const struct view *v, struct image *f
 }
 
 /* Add the objects marked, each by itself. */
-static int draw_large(const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e, const unsigned char *large,
-                      struct image *im, int threads, struct field_losses *lost)
+static int draw_large(struct field_sum *s, const struct accuracy *a, size_t n, const struct emitter *e, const unsigned char *large,
+                      struct image *im, int threads)
 {
     struct plan p = {0};
     size_t marked = 0;
@@ -209,35 +223,37 @@ static int draw_large(const struct view *v, const struct accuracy *a, size_t n, 
         if (!large[i])
             own[i].flux = 0;               /* parts of an object keep their places */
     }
-    int st = scene_plan(&p, v, a, n, own);
+    int st = scene_plan(&p, s->v, a, n, own);
     if (st == OK)
         st = scene_render(&p, im, threads, NULL);
-    lost->bad += p.n_bad;
-    lost->cut += p.n_short;
+    s->lost.bad += p.n_bad;
+    s->lost.cut += p.n_short;
     plan_free(&p);
     free(own);
     return st;
 }
 
-int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
-                 struct image *im, int threads, struct progress *bar, struct field_losses *lost)
+int field_add(struct field_sum *s, const struct accuracy *a, size_t n, const struct emitter *e, struct image *im, int threads,
+              struct progress *bar)
 {
-    if (im->nx != v->nx || im->ny != v->ny)
-        return E_RANGE;
-    struct image fine = {0};
-    double *out = NULL;
     unsigned char *large = calloc(n + 1, 1);
-    int st = large ? blurred(f, v, a, n, e, &fine, threads, bar, large, lost) : E_NOMEM;
+    int st = large ? blurred(s, a, n, e, threads, bar, large) : E_NOMEM;
     if (st == OK)
-        st = convolve(f, v, &fine, &out);
-    image_free(&fine);
+        st = draw_large(s, a, n, e, large, im, threads);
+    free(large);
+    return st;
+}
+
+int field_end(struct field_sum *s, struct image *im)
+{
+    const struct field *f = s->f;
+    double *out = NULL;
+    int st = im->nx == s->v->nx && im->ny == s->v->ny ? convolve(f, s->v, &s->fine, &out) : E_RANGE;
+    image_free(&s->fine);
     const double scale = 1 / ((double)f->nx * f->ny);
     for (long y = 0; st == OK && y < im->ny; y++)
         for (long x = 0; x < im->nx; x++)
             im->pix[y * im->nx + x] += (float)(scale * out[(size_t)(y + f->y0) * (size_t)f->nx + (size_t)(x + f->x0)]);
     fft_free(out);
-    if (st == OK)
-        st = draw_large(v, a, n, e, large, im, threads, lost);
-    free(large);
     return st;
 }

@@ -38,11 +38,22 @@ struct field_losses {
 };
 
 /*
- * Add the scene to im (of the view's size).  Objects outside the margin are left out.
+ * The fine grid, to which objects are added as often as there are some.  Objects outside the margin are left out; those too
+ * large for the grid go to im (of the view's size) at once, the others with field_end().
  * Error: eps of an object's peak or floor as with stamps, and
  * 2e-7 of the peak from float32. E_NOMEM, E_RANGE.
  */
-MUST_CHECK int field_render(const struct field *f, const struct view *v, const struct accuracy *a, size_t n, const struct emitter *e,
-                            struct image *im, int threads, struct progress *bar, struct field_losses *lost);
+struct field_sum {
+    const struct field *f;
+    const struct view *v;
+    struct image fine;
+    struct field_losses lost;
+};
+
+MUST_CHECK int field_begin(struct field_sum *s, const struct field *f, const struct view *v);
+MUST_CHECK int field_add(struct field_sum *s, const struct accuracy *a, size_t n, const struct emitter *e, struct image *im,
+                         int threads, struct progress *bar);
+/* Convolve, add to im and free s, whatever happens. */
+MUST_CHECK int field_end(struct field_sum *s, struct image *im);
 
 #endif

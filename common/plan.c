@@ -21,7 +21,6 @@
 
 #define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
 #define PART_PIXELS 2097152    /* larger stamps are made in parts */
-#define PIXEL_COST 3.5e-9        /* seconds to sum, convert and write a pixel of the image */
 #define LONGEST 10.0           /* seconds for one object without a stamp; those that need more are not drawn */
 #define BROAD_X 0.5e-9         /* seconds for one frequency of a large object in one column of the image */
 #define BROAD_Y 0.3e-9         /* and for one row of frequencies in one pixel */
@@ -643,7 +642,6 @@ static int make(struct maker *m)
         p->count[p->draw[i].path]++;
         p->cost += cost_of(p, &p->emitter[i], &p->draw[i]);
     }
-    p->cost += PIXEL_COST * (double)p->view.nx * (double)p->view.ny;
     return st;
 }
 

@@ -104,7 +104,7 @@ struct plan {
     size_t count[PATH_COUNT];
     size_t n_short;                   /* stamps of side_max whose wings, beyond it, repeat above the wanted accuracy */
     size_t n_bad;                     /* objects that are not numbers, of an order that cannot be turned, or too thin to be summed */
-    double cost;                      /* predicted CPU seconds on one thread */
+    double cost;                      /* predicted CPU seconds on one thread, for the objects */
     double bytes;                     /* memory of tables and draws */
     size_t fft_plans;                 /* FFT plans made: 0 without a PSF */
 };

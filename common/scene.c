@@ -17,10 +17,16 @@ struct columns {
 /* One row being read. */
 struct reader {
     const char *name;
-    size_t row;
+    size_t row, before;    /* of the block; rows of the list before it */
     struct err *e;
     int st;                /* first failure */
 };
+
+/* In the list, from 1. */
+static size_t row_number(const struct reader *r)
+{
+    return r->before + r->row + 1;
+}
 
 static const struct column *numeric(struct reader *r, const struct table *t, const char *name)
 {
@@ -84,7 +90,7 @@ static double cell(struct reader *r, const struct column *c, double lo, double h
         return otherwise;
     double v = table_number(c, r->row);
     if (!(v >= lo && v <= hi) && !r->st)
-        r->st = err_set(r->e, E_DATA, "%s: row %zu: %s %.9g is not in %g..%g", r->name, r->row + 1, c->name, v, lo, hi);
+        r->st = err_set(r->e, E_DATA, "%s: row %zu: %s %.9g is not in %g..%g", r->name, row_number(r), c->name, v, lo, hi);
     return v;
 }
 
@@ -95,14 +101,14 @@ static double length(struct reader *r, const struct column *c, double otherwise)
         return otherwise;
     double v = table_number(c, r->row);
     if (!(v > 0 && v <= 1e6) && !r->st)
-        r->st = err_set(r->e, E_DATA, "%s: row %zu: %s %.9g must be > 0 and <= 1e6", r->name, r->row + 1, c->name, v);
+        r->st = err_set(r->e, E_DATA, "%s: row %zu: %s %.9g must be > 0 and <= 1e6", r->name, row_number(r), c->name, v);
     return v;
 }
 
 static void need(struct reader *r, const struct column *c, const char *column, const char *type)
 {
     if (!c && !r->st)
-        r->st = err_set(r->e, E_MISSING, "%s: row %zu: TYPE %s needs a column %s", r->name, r->row + 1, type, column);
+        r->st = err_set(r->e, E_MISSING, "%s: row %zu: TYPE %s needs a column %s", r->name, row_number(r), type, column);
 }
 
 static enum object_type read_type(struct reader *r, const struct columns *c)
@@ -111,7 +117,7 @@ static enum object_type read_type(struct reader *r, const struct columns *c)
     for (int i = 0; i < 4; i++)
         if (strcmp(c->type->v.s[r->row], names[i]) == 0)
             return (enum object_type)i;
-    r->st = err_set(r->e, E_DATA, "%s: row %zu: TYPE '%.40s' is unknown (star, shapelet, gauss or sersic)", r->name, r->row + 1,
+    r->st = err_set(r->e, E_DATA, "%s: row %zu: TYPE '%.40s' is unknown (star, shapelet, gauss or sersic)", r->name, row_number(r),
                     c->type->v.s[r->row]);
     return OBJECT_STAR;
 }
@@ -120,7 +126,7 @@ static enum object_type read_type(struct reader *r, const struct columns *c)
 static void read_place(struct reader *r, const struct columns *c, enum scene_where where, double zeropoint, struct object *o)
 {
     double limit = where == SCENE_SKY ? 360 : 1e30;   /* what is far outside is skipped, not refused */
-    o->id = c->id ? c->id->v.i[r->row] : (int64_t)r->row + 1;
+    o->id = c->id ? c->id->v.i[r->row] : (int64_t)row_number(r);
     o->x = cell(r, c->x, -limit, limit, 0);
     o->y = cell(r, c->y, where == SCENE_SKY ? -90 : -limit, where == SCENE_SKY ? 90 : limit, 0);
     o->flux = c->flux ? cell(r, c->flux, -1e30, 1e30, 0) : pow(10, 0.4 * (zeropoint - cell(r, c->mag, -50, 100, 0)));
@@ -131,27 +137,27 @@ static void read_map(struct reader *r, const struct columns *c, struct object *o
 {
     double parity = cell(r, c->parity, -1, 1, 1);
     if (fabs(parity) != 1 && !r->st)
-        r->st = err_set(r->e, E_DATA, "%s: row %zu: PARITY %.9g is neither 1 nor -1", r->name, r->row + 1, parity);
+        r->st = err_set(r->e, E_DATA, "%s: row %zu: PARITY %.9g is neither 1 nor -1", r->name, row_number(r), parity);
     o->parity = parity < 0 ? -1 : 1;
     o->rot = degree * cell(r, c->rot, -3600, 3600, 0);
     o->dilation = length(r, c->dilation, 1);
     o->g1 = cell(r, c->g1, -1, 1, 0);
     o->g2 = cell(r, c->g2, -1, 1, 0);
     if (!(hypot(o->g1, o->g2) < 1) && !r->st)
-        r->st = err_set(r->e, E_DATA, "%s: row %zu: shear G1 %.9g, G2 %.9g must have |g| < 1", r->name, r->row + 1, o->g1, o->g2);
+        r->st = err_set(r->e, E_DATA, "%s: row %zu: shear G1 %.9g, G2 %.9g must have |g| < 1", r->name, row_number(r), o->g1, o->g2);
 }
 
 static void read_model(struct reader *r, const struct columns *c, const struct models *m, struct object *o)
 {
     need(r, c->model, "MODEL", "shapelet");
     if (!m && !r->st)
-        r->st = err_set(r->e, E_MISSING, "%s: row %zu: TYPE shapelet needs a shapelet catalogue", r->name, r->row + 1);
+        r->st = err_set(r->e, E_MISSING, "%s: row %zu: TYPE shapelet needs a shapelet catalogue", r->name, row_number(r));
     if (r->st)
         return;
     const size_t model = models_find(m, c->model->v.i[r->row]);
     o->model = (unsigned int)model;
     if (model == m->n || model > UINT_MAX)
-        r->st = err_set(r->e, E_MISSING, "%s: row %zu: MODEL %lld is not in the shapelet catalogue", r->name, r->row + 1,
+        r->st = err_set(r->e, E_MISSING, "%s: row %zu: MODEL %lld is not in the shapelet catalogue", r->name, row_number(r),
                         (long long)c->model->v.i[r->row]);
 }
 
@@ -184,10 +190,11 @@ static int read_row(struct reader *r, const struct columns *c, const struct mode
     return r->st;
 }
 
-int scene_open(struct scene *s, const struct table *t, const struct models *m, double zeropoint, const char *name, struct err *e)
+int scene_open(struct scene *s, const struct table *t, size_t before, const struct models *m, double zeropoint, const char *name,
+               struct err *e)
 {
     struct columns c = {0};
-    struct reader r = {.name = name, .e = e};
+    struct reader r = {.name = name, .before = before, .e = e};
     struct scene got = {.n = t->nrow};
     int st = find_columns(&r, t, &c, &got.where);
     if (st)

@@ -1,5 +1,5 @@
 /*
- * scene.h - a scene list in memory: what stands where, how bright, how shaped.
+ * scene.h - rows of a scene list in memory: what stands where, how bright, how shaped.
  *
  * Columns (pixshear(7)): a position, FLUX or MAG, TYPE, and per type
  *   star      nothing
@@ -49,12 +49,12 @@ struct scene {
 };
 
 /*
- * Check the list t (read from `name`, for messages) and convert it.  DX DY win
+ * Check rows of a list (read from `name`, for messages; `before` rows come before them) and convert them.  DX DY win
  * over RA DEC over X_IMAGE Y_IMAGE, FLUX over MAG.  m may be NULL when no
  * object is a shapelet.  `zeropoint` is the magnitude of 1 electron/s.  A cell that an object
  * uses must be a number in range; e names row and column otherwise.
  */
-MUST_CHECK int scene_open(struct scene *s, const struct table *t, const struct models *m, double zeropoint,
+MUST_CHECK int scene_open(struct scene *s, const struct table *t, size_t before, const struct models *m, double zeropoint,
                           const char *name, struct err *e);
 void scene_free(struct scene *s);
 

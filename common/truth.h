@@ -1,5 +1,8 @@
 /*
  * truth.h - the scene list with where and how bright each object is in an image: what detections are compared with.
+ *
+ * All columns of the list and, behind them, X_IMAGE Y_IMAGE (first pixel centre is 1), ALPHA_J2000 DELTA_J2000, FLUX_IMAGE
+ * (expected electrons); columns of these names are replaced.  The rows go to the file block by block.
  */
 #ifndef PIXSHEAR_TRUTH_H
 #define PIXSHEAR_TRUTH_H
@@ -7,14 +10,24 @@
 #include "err.h"
 #include "header.h"
 #include "scene.h"
+#include "sky.h"
 #include "table.h"
+#include <stddef.h>
+
+struct truth;
 
 /*
- * To the list t of scene s: X_IMAGE Y_IMAGE (x[i] + 1, y[i] + 1: pixel positions from the
- * first centre = 0), ALPHA_J2000 DELTA_J2000 by the world coordinates of the image's header h, FLUX_IMAGE (the expected
- * electrons of `exptime` seconds), and the keywords of h.  Columns of these names are replaced, all others stay.
+ * The catalogue `name` for a list with the columns, keywords and history of `list`; the keywords of the image h are added and
+ * `record` to HISTORY.  sky: the world coordinates of h.  Everything but list and h must stay until truth_close().
  */
-MUST_CHECK int truth_add(struct table *t, const struct scene *s, const struct header *h, const double *x, const double *y,
-                         double exptime);
+MUST_CHECK int truth_open(struct truth **t, const struct table *list, const struct header *h, struct sky *sky, const char *name,
+                          const char *record, const char *const *inputs, size_t n_inputs, struct err *e);
+
+/* Append the rows of `list`, whose objects are those of s at pixels x[i], y[i] (first centre is 0); exptime in s. */
+MUST_CHECK int truth_rows(struct truth *t, const struct table *list, const struct scene *s, const double *x, const double *y,
+                          double exptime, struct err *e);
+
+/* Make the file appear; frees t whatever happens. */
+MUST_CHECK int truth_close(struct truth *t, struct err *e);
 
 #endif

@@ -24,14 +24,18 @@ done
 # larger than the image, without a PSF
 printf '# DX DY MAG TYPE RE\n0 0 18 gauss 60\n' >huge.txt
 coefficients=1 bounded huge.txt 0.04 1
-# a long list: 208 bytes for each object more, and --max-memory counts them before they are taken
-awk 'BEGIN { print "# DX DY FLUX TYPE RE"; for (i = 0; i < 400000; i++) printf "0.03 0.01 %d star 0.1\n", 1 + i % 7 }' >many.txt
-limit=$(awk 'BEGIN { printf "%.0f", 1024 * 33 + (4 * 1e4 + 208 * 4e5) / 1024 }')
-for o in "" "-p psf.fits --accuracy 1e-2"; do
-    peak peak.txt simage many.txt -x 0.1 --size 100,100 -q $o -o out.fits || fail "simage many.txt $o"
-    between "simage, 400000 objects, $o: peak KiB" "$(cut -d' ' -f1 peak.txt)" 40000 "$limit"
+# a list of any length: stars, Gaussians, Sersic profiles of 40 Gaussians each, with the truth beside it, from a pipe
+awk 'BEGIN { print "# Column 1: DX [,f64] x\n# Column 2: DY [,f64] y\n# Column 3: FLUX [,f64] f\n# Column 4: TYPE [,str8] t\n# Column 5: RE [,f64] r\n# Column 6: N [,f64] n"
+    print "# DX DY FLUX TYPE RE N"; for (i = 0; i < 400000; i++) printf "0.03 0.01 %d star 0.1 1.5\n", 1 + i % 7 }' >many.txt
+sed 's/star/gauss/' many.txt >gauss.txt
+sed 's/star/sersic/' many.txt | head -3007 >sersic.txt
+limit=$(awk 'BEGIN { printf "%.0f", 1024 * 33 + 4 * 1e4 / 1024 }')
+for o in many.txt "many.txt -p psf.fits --accuracy 1e-2" "gauss.txt --truth t.txt" "sersic.txt -p psf.fits --accuracy 1e-2" "sersic.txt --shear 0.05,0.03"; do
+    peak peak.txt simage $o -x 0.1 --size 100,100 -q -o out.fits || fail "simage $o"
+    between "simage $o, $(grep -vc '^#' ${o%% *}) objects: peak KiB" "$(cut -d' ' -f1 peak.txt)" 4000 "$limit"
 done
-fails "400000 objects in 40 MB" 1 simage many.txt -x 0.1 --size 100,100 --max-memory 40M -o out.fits
-sed 's/star/sersic/; s/RE$/RE N/; s/0.1$/0.1 4/' many.txt | head -100000 >sersic.txt
-fails "the parts of 1e5 Sersic profiles in 100 MB" 1 simage sersic.txt -x 0.1 --size 100,100 --max-memory 100M -o out.fits
-ok "400000 objects in 100 MB" simage many.txt -x 0.1 --size 100,100 --max-memory 100M -q -o out.fits
+peak peak.txt simage - -x 0.1 --size 100,100 -q -o out.fits <many.txt
+between "simage, 400000 objects from a pipe: peak KiB" "$(cut -d' ' -f1 peak.txt)" 4000 "$limit"
+ok "400000 objects in 10 MB" simage many.txt -x 0.1 --size 100,100 --max-memory 10M -q -o out.fits
+fails "an image of 100 MB in 50 MB, before the list is read" 1 simage many.txt -x 0.1 --size 5000,5000 --max-memory 50M -o none.fits
+fails "the same told by --check" 1 simage many.txt -x 0.1 --size 5000,5000 --max-memory 50M --check

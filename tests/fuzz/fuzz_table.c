@@ -70,7 +70,7 @@ void fuzz_file(const char *name)
         return;
     }
     int models = models_open(&m, &t, name, &e) == OK;
-    if (scene_open(&s, &t, models ? &m : NULL, 26.65, name, &e) == OK)
+    if (scene_open(&s, &t, 0, models ? &m : NULL, 26.65, name, &e) == OK)
         scene_free(&s);
     if (models)
         models_free(&m);

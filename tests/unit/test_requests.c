@@ -12,6 +12,7 @@
 #include "population.h"
 #include "render.h"
 #include "scenes.h"
+#include "sersic.h"
 #include "shapelet.h"
 #include "shear.h"
 #include "tableio.h"
@@ -281,7 +282,9 @@ static void requested(const struct request *q, const struct otf *t, const struct
         x[all->n + s.n] = ROOM / 2 + uniform((int)i, 13);
         s.object[s.n++] = all->object[i];
     }
-    if (emission_new(&e, &s, m, x, x + all->n, NULL, 2000) || scene_plan(&p, &v, &a, e.n, e.emitter) || stamp_work_new(&r.work))
+    size_t next = 0;
+    if (emission_new(&e, s.n * SERSIC_PARTS) || emission_add(&e, &next, &s, m, x, x + all->n, NULL, 2000)
+        || scene_plan(&p, &v, &a, e.n, e.emitter) || stamp_work_new(&r.work))
         exit(1);
     r.scratch = malloc((3 * plan_scratch(&p) + 1) * sizeof *r.scratch);
     r.sum = fft_alloc((size_t)ROOM * ROOM * sizeof *r.sum);

@@ -104,7 +104,7 @@ static void refuse_scene(const struct models *m, int column, size_t row, double 
         t.col[column].v.i[row] = (int64_t)value;
     else if (!st)
         t.col[column].v.r[row] = value;
-    check_that(!st && scene_open(&s, &t, m, 26, "s", &e) != OK && !strcmp(e.text, want), "refused: %s", e.text);
+    check_that(!st && scene_open(&s, &t, 0, m, 26, "s", &e) != OK && !strcmp(e.text, want), "refused: %s", e.text);
     if (strcmp(e.text, want))
         printf("# wanted %s\n", want);
     table_free(&t);
@@ -117,7 +117,7 @@ static void test_scene(void)
     struct scene s = {0};
     struct err e = {""};
     int st = new_catalogue(&mt) || add_model(&mt, 3, 0.1, 0, 1, 1) || add_model(&mt, 7, 0.2, 1, 3, 1);
-    if (!check_that(!st && models_open(&m, &mt, "m", &e) == OK && new_scene(&t) == 0 && scene_open(&s, &t, &m, 26.5, "s", &e) == OK,
+    if (!check_that(!st && models_open(&m, &mt, "m", &e) == OK && new_scene(&t) == 0 && scene_open(&s, &t, 0, &m, 26.5, "s", &e) == OK,
                     "a scene of four types (%s)", e.text))
         return;
     const struct object *o = s.object;
@@ -129,8 +129,8 @@ static void test_scene(void)
     check_that(o[1].type == OBJECT_STAR && o[1].parity == 1 && o[1].g1 == 0 && o[1].rot == 0, "a star ignores cells it has no use for");
     check_that(o[2].re == 0.3 && o[2].q == 0.5 && fabs(o[2].pa - acos(0) / 2) < 1e-15 && o[3].n == 4, "profiles");
     scene_free(&s);
-    check_that(scene_open(&s, &t, NULL, 26.5, "s", &e) == E_MISSING, "no catalogue: %s", e.text);
-    check_that(table_set_word(&t.col[TYPE], 3, "galaxy") == OK && scene_open(&s, &t, &m, 26.5, "s", &e) == E_DATA
+    check_that(scene_open(&s, &t, 0, NULL, 26.5, "s", &e) == E_MISSING, "no catalogue: %s", e.text);
+    check_that(table_set_word(&t.col[TYPE], 3, "galaxy") == OK && scene_open(&s, &t, 0, &m, 26.5, "s", &e) == E_DATA
                && !strcmp(e.text, "s: row 4: TYPE 'galaxy' is unknown (star, shapelet, gauss or sersic)"), "refused: %s", e.text);
     table_free(&t);
     refuse_scene(&m, DX, 0, (double)NAN, "s: row 1: DX nan is not in -1e+30..1e+30");
