@@ -341,11 +341,11 @@ static void next_block(struct input *in, const struct request *r, struct emissio
 }
 
 /* Seconds that it took. */
-static double draw(const struct plan *p, struct image *im, const struct common *c, struct progress *bar)
+static double draw(const struct plan *p, struct image *im, double *sums, const struct common *c, struct progress *bar)
 {
     struct timespec begin, end;
     timespec_get(&begin, TIME_UTC);
-    int st = scene_render(p, im, c->threads, bar);
+    int st = scene_render_part(p, im, sums, c->threads, bar);
     timespec_get(&end, TIME_UTC);
     check(st);
     progress_tick(bar, (long)p->count[PATH_NONE]);
@@ -362,6 +362,7 @@ static void draw_stamps(struct input *in, const struct view *v, const struct req
     int last;
     next_block(in, r, block);
     progress_begin(&bar, "simage", in->list.end ? (long)block->n : -1, c->quiet || c->check);
+    double *sums = in->list.end || c->check ? NULL : scene_sums(im);
     do {
         struct plan plan;
         make_plan(&plan, v, r, c, block);
@@ -374,13 +375,16 @@ static void draw_stamps(struct input *in, const struct view *v, const struct req
         if (last && !plan.lean)
             otf_free(&in->otf);            /* the plan holds its own tables */
         if (!c->check)
-            seconds += draw(&plan, im, c, &bar);
+            seconds += draw(&plan, im, sums, c, &bar);
         plan_free(&plan);
         progress_part(&bar, scene_list_part(&in->list));
         if (!last)
             next_block(in, r, block);
     } while (!last);
     progress_end(&bar);
+    if (sums)
+        scene_add_sums(sums, im);
+    free(sums);
     if (c->verbose && !c->check)
         fprintf(stderr, "simage: drawn in %.3f s\n", seconds);
 }

@@ -385,14 +385,30 @@ static int run(struct job *j, long chunks, int threads, struct par_team *team)
     return st;
 }
 
+/* The rows of a pass: its own, or those that stay, which hold the whole image and never move. */
+static int window_new(struct window *w, struct image *im, int tallest, double *sums)
+{
+    *w = (struct window){.im = im, .height = tallest > im->ny || sums ? (int)im->ny : tallest, .row = sums};
+    for (int strip = 0; strip < STRIPS && sums; strip++)
+        w->next[strip] = im->ny;
+    if (tallest == 0 || sums)
+        return OK;
+    const size_t bytes = (size_t)w->height * (size_t)im->nx * sizeof *w->row;
+    w->row = malloc(bytes);
+    if (!w->row)
+        return E_NOMEM;
+    memset(w->row, 0, bytes);              /* here, not by threads that meet in its pages */
+    return OK;
+}
+
 /* One pass has its own memory: that of tall stamps is given back before the window is made. */
-static int render_pass(const struct plan *p, const struct pass *q, const struct entry *e, struct image *im, struct par_team *team,
-                       struct progress *bar)
+static int render_pass(const struct plan *p, const struct pass *q, const struct entry *e, struct image *im, double *sums,
+                       struct par_team *team, struct progress *bar)
 {
     if (q->n == 0)
         return OK;
     int threads = par_team_size(team);
-    struct window w = {.im = im, .height = q->tallest > im->ny ? (int)im->ny : q->tallest};
+    struct window w;
     const size_t space = (q->largest > CHUNK_PIXELS ? q->largest : CHUNK_PIXELS) + 8, most = (SPACE_PIXELS + (size_t)threads * CHUNK_PIXELS) / space;
     int hold = most / (size_t)threads > HELD ? HELD : (int)(most / (size_t)threads);
     if (hold < 1) {                                /* few large stamps at a time */
@@ -401,11 +417,9 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
     }
     size_t *first = malloc((q->n + 1) * sizeof *first);
     struct worker *workers = calloc((size_t)threads, sizeof *workers);
-    if (q->tallest)
-        w.row = malloc((size_t)w.height * (size_t)im->nx * sizeof *w.row);
-    if (w.row)
-        memset(w.row, 0, (size_t)w.height * (size_t)im->nx * sizeof *w.row);    /* here, not by threads that meet in its pages */
-    int st = first && workers && (w.row || !q->tallest) ? workers_new(workers, threads, plan_scratch(p), space, hold) : E_NOMEM;
+    int st = window_new(&w, im, q->tallest, sums);
+    if (st == OK)
+        st = first && workers ? workers_new(workers, threads, plan_scratch(p), space, hold) : E_NOMEM;
     if (st == OK) {
         struct job job = {.p = p, .entry = e, .first = first, .w = &w, .worker = workers, .hold = hold, .bar = bar};
         st = run(&job, cut_chunks(p, e, q->n, first), threads, team);
@@ -414,11 +428,27 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
         window_move(&w, strip, im->ny);
     workers_free(workers, threads);
     free(first);
-    free(w.row);
+    if (!sums)
+        free(w.row);
     return st;
 }
 
+double *scene_sums(const struct image *im)
+{
+    return image_count(im) <= WINDOW_PIXELS ? calloc(image_count(im), sizeof(double)) : NULL;
+}
+
+void scene_add_sums(const double *sums, struct image *im)
+{
+    add_floats((long)image_count(im), sums, im->pix);
+}
+
 int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar)
+{
+    return scene_render_part(p, im, NULL, threads, bar);
+}
+
+int scene_render_part(const struct plan *p, struct image *im, double *sums, int threads, struct progress *bar)
 {
     if (im->nx != p->view.nx || im->ny != p->view.ny || threads < 1 || threads > 256 || p->n > UINT_MAX)
         return E_RANGE;
@@ -433,7 +463,7 @@ int scene_render(const struct plan *p, struct image *im, int threads, struct pro
     if (st == OK)
         order(p, e, pass);
     for (int k = 0; k < PASSES && st == OK; from += pass[k++].n)
-        st = render_pass(p, &pass[k], from, im, team, bar);
+        st = render_pass(p, &pass[k], from, im, sums, team, bar);
     par_team_free(team);
     free(e);
     return st;

@@ -18,6 +18,14 @@
 /* Add to im (of the view's size, as image_new made it). bar may be NULL. */
 MUST_CHECK int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar);
 
+/*
+ * Scenes of several plans: pixels in double that stay from one to the next, where the image is so small that they take no more
+ * memory than a window of rows does; NULL for others, whose pixels each plan rounds to float32.  They are added to im at the end.
+ */
+double *scene_sums(const struct image *im);
+void scene_add_sums(const double *sums, struct image *im);
+MUST_CHECK int scene_render_part(const struct plan *p, struct image *im, double *sums, int threads, struct progress *bar);
+
 /* Object i alone, in double: stamp of draw[i].nx x draw[i].ny (fft_alloc'ed by the caller). */
 MUST_CHECK int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *scratch, double *out);
 
