@@ -115,6 +115,9 @@ static void decide(const struct work *w, struct plan *p)
     if (p->rate > 0 && isnan(scale))
         die(EXIT_RUN, "%s: no keyword PIXSCALE and no WCS: give --pixscale", p->label);
 
+    if (!isnan(r->zeropoint) && !timed && isnan(p->time))
+        die(EXIT_RUN, "%s: no sky and no keyword EXPTIME: --zeropoint would do nothing: leave it out or give --exptime", p->label);
+
     struct noise *m = &p->noise;
     *m = (struct noise){.qe = r->qe, .read_noise = r->read_noise, .saturate = r->saturate, .gain = r->gain};
     m->sky = p->rate > 0 ? p->rate * scale * scale * p->time : 0;
@@ -123,6 +126,8 @@ static void decide(const struct work *w, struct plan *p)
         p->subtracted = 0;
     const double before = p->subtracted ? 0 : header_double_or(&x->hdr, "SKYLEVEL", 0) * r->qe;
     p->level = before + m->sky + m->dark;
+    if (r->subtract && !(p->level > 0) && isnan(r->sky_mag) && isnan(r->sky_rate) && isnan(r->depth) && !(r->dark > 0))
+        die(EXIT_RUN, "%s: no sky and no dark: --subtract-sky would do nothing: leave it out", p->label);
     m->subtract = r->subtract ? p->level : 0;
     m->mirror = r->mirror;
     if (w->c->verbose || w->c->check)
@@ -231,7 +236,10 @@ static void report(const struct noise_counts *n, const char *name)
 
 static void check_options(const struct request *r, const struct opt *own, const struct common *c)
 {
-    static const char *const point[] = {"psf", "psf-scale", NULL}, *const depth[] = {"depth-definition", NULL};
+    static const char *const point[] = {"psf", "psf-scale", NULL}, *const depth[] = {"depth-definition", NULL},
+                      *const pixel[] = {"pixscale", NULL};
+    if (isnan(r->depth) && isnan(r->sky_mag) && isnan(r->sky_rate))
+        opt_idle(own, c, pixel, "without a sky");
     if (isnan(r->depth))
         opt_idle(own, c, depth, "without --depth");
     if (r->definition == DEPTH_AREA)

@@ -599,7 +599,7 @@ int main(int argc, char **argv)
          .help = "median filter over N x N cells, odd"},
         {.name = "back-type", .type = OPT_CHOICE, .value = &o.p.dark_sky, .choices = "mode|dark", .arg = "TYPE",
          .help = "level of a cell: 2.5 median - 1.5 mean, or the mean of its dark part"},
-        {.name = "rms", .type = OPT_REAL, .value = &o.p.rms, .lo = 0, .hi = 1e30, .arg = "R",
+        {.name = "rms", .type = OPT_REAL, .value = &o.p.rms, .lo = 1e-30, .hi = 1e30, .arg = "R",
          .help = "noise of a pixel, unit of the image (default: measured)"},
         {.name = "weight", .letter = 'w', .type = OPT_STR, .value = &o.weight, .arg = "FILE", .in_file = 1,
          .help = "weight map of the image's size"},

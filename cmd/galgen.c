@@ -65,8 +65,14 @@ static void check_options(struct params *p, const struct opt *own, const struct 
 {
     if (!(p->mag[0] < p->mag[1]))
         die(EXIT_USAGE, "--mag-range %g,%g: the first magnitude must be the smaller one", p->mag[0], p->mag[1]);
-    if (p->stars && (p->library || p->models || opt_given(own, c, "mag-range")))
-        die(EXIT_USAGE, "--stars makes no use of --%s", p->library ? "library" : p->models ? "models" : "mag-range (see --star-mag)");
+    static const char *const field[] = {"library", "models", NULL}, *const counts[] = {"mag-range", NULL},
+                      *const recipe[] = {"nmax", "size", "size-scatter", "smoothing", NULL};
+    if (p->stars) {
+        opt_idle(own, c, field, "with --stars");
+        opt_idle(own, c, counts, "with --stars (see --star-mag)");
+    }
+    if (p->stars || p->library)
+        opt_idle(own, c, recipe, p->stars ? "with --stars" : "with --library, whose galaxies have their own shapes");
     if (!p->stars && opt_given(own, c, "star-mag"))
         die(EXIT_USAGE, "--star-mag needs --stars");
     if (!p->library && opt_given(own, c, "library-mags"))

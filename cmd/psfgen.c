@@ -46,6 +46,21 @@ static void parse_zernike(const char *text, struct pupil *p)
     free(copy);
 }
 
+/* Options of what the telescope does not have would do nothing. */
+static void check_telescope(const struct pupil *p, const struct opt *own, const struct common *c)
+{
+    static const char *const band[] = {"wavelengths", NULL}, *const strut[] = {"strut-width", "strut-angle", NULL},
+                      *const angle[] = {"strut-angle", NULL}, *const offset[] = {"obscuration-offset", NULL};
+    if (!(p->bandwidth > 0))
+        opt_idle(own, c, band, "without --bandwidth");
+    if (!p->struts)
+        opt_idle(own, c, strut, "without struts");
+    if (!(p->strut_width > 0))
+        opt_idle(own, c, angle, "with struts of no width");
+    if (!(p->obscuration > 0))
+        opt_idle(own, c, offset, "without an obscuration");
+}
+
 /* The preset, changed by what was typed. */
 static void choose_telescope(struct psfgen *g, const struct opt *own, const struct common *c)
 {
@@ -69,6 +84,7 @@ static void choose_telescope(struct psfgen *g, const struct opt *own, const stru
     if (!(g->pupil.bandwidth < 2 * g->pupil.wavelength))
         die(EXIT_USAGE, "option --bandwidth: %g nm: must be below twice the wavelength, %g nm", g->bandwidth_nm,
             2e9 * g->pupil.wavelength);
+    check_telescope(&g->pupil, own, c);
     memcpy(g->pupil.offset, typed.offset, sizeof typed.offset);
     g->pupil.wavelengths = (int)g->wavelengths;
     if (!opt_given(own, c, "diffusion"))

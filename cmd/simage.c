@@ -94,6 +94,8 @@ static void check_options(const struct request *r, const struct opt *own, const 
     static const char *const of_psf[] = {"psf-scale", "psf-cutoff", "psf-has-pixel", "psf-normalise", NULL};
     if (!r->psf)
         opt_idle(own, c, of_psf, "without --psf");
+    if (!(fabs(r->centre[1]) <= 90))
+        die(EXIT_USAGE, "--center %g,%g: declination is -90 to 90 degrees", r->centre[0], r->centre[1]);
     if ((r->box[0] > 0 || r->edge[0] + r->edge[1] > 0) && r->no_pixel)
         die(EXIT_USAGE, "--pixel and --no-pixel: give one");
     for (int i = 0; i < 2; i++)

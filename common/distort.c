@@ -3,6 +3,7 @@
 #include "shear.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define STEP 0.5               /* pixels to either side for the derivative */
 
@@ -46,18 +47,30 @@ static int to_plane(struct sky *wcs, struct sky *plane, size_t n, double *x, dou
     return st ? st : lenient(sky_to_pixel(plane, n, x, y, x, y));
 }
 
-/* px, py: the four neighbours of each object, 4 n. */
-static void derivative(double pixel, size_t n, const double *px, const double *py, double (*map)[4])
+/* px, py: the four neighbours of each object, 4 n; x0 its place. */
+static void derivative(double pixel, size_t n, const double *x0, const double *px, const double *py, double (*map)[4])
 {
     for (size_t i = 0; i < n; i++) {
         const double *x = px + 4 * i, *y = py + 4 * i;     /* left, right, below, above */
         const double xx = x[1] - x[0], xy = x[3] - x[2], yx = y[1] - y[0], yy = y[3] - y[2];
+        if (isinf(x0[i])) {
+            memcpy(map[i], (double[4]){1, 0, 0, 1}, sizeof map[i]);
+            continue;
+        }
         const double scale = 2 * STEP * pixel / (xx * yy - xy * yx);
         map[i][0] = yy * scale;
         map[i][1] = -xy * scale;
         map[i][2] = -yx * scale;
         map[i][3] = xx * scale;
     }
+}
+
+/* Objects on the other side of the sky are outside: infinitely far. */
+static void outside(const struct sky *wcs, size_t n, const double *ra, const double *dec, double *x, double *y)
+{
+    for (size_t i = 0; i < n; i++)
+        if (isnan(x[i]) && sky_far(wcs, ra[i], dec[i]))
+            x[i] = y[i] = INFINITY;
 }
 
 int distort(struct sky *wcs, const double centre[2], enum scene_where where, double pixel, size_t n, double *x, double *y,
@@ -69,8 +82,10 @@ int distort(struct sky *wcs, const double centre[2], enum scene_where where, dou
     int st = px ? plane_open(&plane, centre) : E_NOMEM;
     if (st == OK)
         st = to_sky(wcs, plane, where, n, x, y, px, py);
-    if (st == OK && where != SCENE_PIXEL)
+    if (st == OK && where != SCENE_PIXEL) {
         st = lenient(sky_to_pixel(wcs, n, px, py, x, y));
+        outside(wcs, n, px, py, x, y);
+    }
     for (size_t i = 0; i < 4 * n && st == OK; i++) {
         px[i] = x[i / 4] + dx[i % 4];
         py[i] = y[i / 4] + dy[i % 4];
@@ -78,7 +93,7 @@ int distort(struct sky *wcs, const double centre[2], enum scene_where where, dou
     if (st == OK)
         st = to_plane(wcs, plane, 4 * n, px, py);
     if (st == OK)
-        derivative(pixel, n, px, py, map);
+        derivative(pixel, n, x, px, py, map);
     sky_close(plane);
     free(px);
     return st;

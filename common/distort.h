@@ -17,7 +17,7 @@
  * x[i], y[i]: positions of n objects as `where` says (pixels count from 0); replaced by pixels.
  * map[i]: d(pixel)/d(plane) times `pixel` arcsec, rows: the unit matrix for a plain TAN of that
  * pixel, east to the left.  centre: RA, Dec of the middle, deg.  An object that the WCS cannot
- * place gets NaN.  E_NOMEM, E_DATA.
+ * place gets NaN, one on the other side of the sky infinity and the unit matrix.  E_NOMEM, E_DATA.
  */
 MUST_CHECK int distort(struct sky *wcs, const double centre[2], enum scene_where where, double pixel, size_t n, double *x,
                        double *y, double (*map)[4]);

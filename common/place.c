@@ -1,6 +1,7 @@
 /* place.c - where on an image the objects of a scene list are. */
 #include "place.h"
 #include "distort.h"
+#include <math.h>
 
 /* Through a WCS of its own; the field's shear, which is drawn, acts before it. */
 static int through(const struct place *p, const struct scene *s, double *x, double *y, double (*map)[4])
@@ -34,6 +35,9 @@ int place_objects(const struct place *p, const struct scene *s, double *x, doubl
     }
     if (s->where != SCENE_SKY || s->n == 0)
         return OK;
-    int st = sky_to_pixel(p->sky, s->n, x, y, x, y);   /* positions behind the sky are NaN: counted by the plan */
+    int st = sky_to_pixel(p->sky, s->n, x, y, x, y);   /* what is no position becomes NaN: counted by the plan */
+    for (size_t i = 0; i < s->n; i++)
+        if (isnan(x[i]) && sky_far(p->sky, s->object[i].x, s->object[i].y))
+            x[i] = y[i] = INFINITY;                    /* on the other side of the sky: outside */
     return st == E_RANGE ? OK : st;
 }

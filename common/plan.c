@@ -481,10 +481,10 @@ static int plan_one(struct maker *m, size_t i)
     struct pose q;
     struct light l;
     d->matrix = -1;
-    if (!isfinite(s->flux) || !isfinite(s->rotation) || !isfinite(s->x) || !isfinite(s->y)
+    if (!isfinite(s->flux) || !isfinite(s->rotation) || isnan(s->x) || isnan(s->y)
         || (s->coef && (!(s->beta > 0) || !(s->dilation > 0))) || pose_of(&p->view, s, &q))
         return E_DATA;
-    if (s->flux == 0)
+    if (s->flux == 0 || isinf(s->x) || isinf(s->y))
         return OK;
     if (light_of(m, s, &q, &l))
         return s->coef && l.power == 0 ? OK : E_DATA;

@@ -17,7 +17,7 @@
 
 /* One object of the scene.  Order of action: parity, rotation, dilation, own shear, field shear. */
 struct emitter {
-    double x, y;           /* pixels of the image, centre of the first is 0 */
+    double x, y;           /* pixels of the image, centre of the first is 0; infinite: outside */
     double flux;           /* electrons in the whole exposure */
     const double *coef;    /* shapelet coefficients of unit flux, 1/arcsec; NULL: a point */
     double beta;           /* arcsec */

@@ -337,6 +337,13 @@ int sky_to_pixel(struct sky *s, size_t n, const double *ra, const double *dec, d
     return convert(s, 0, n, ra, dec, x, y);
 }
 
+int sky_far(const struct sky *s, double ra, double dec)
+{
+    const double degree = 3.14159265358979324 / 180, a = (ra - s->two.crval[s->two.lng]) * degree;
+    const double d = dec * degree, d0 = s->two.crval[s->two.lat] * degree;
+    return fabs(dec) <= 90 && sin(d) * sin(d0) + cos(d) * cos(d0) * cos(a) <= 0.5;
+}
+
 int sky_is_linear(const struct sky *s)
 {
     return !strcmp(s->two.cel.prj.code, "TAN") && !s->two.lin.dispre && !s->two.lin.disseq;

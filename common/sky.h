@@ -24,6 +24,9 @@ MUST_CHECK int sky_from_pixel(struct sky *s, size_t n, const double *x, const do
 MUST_CHECK int sky_to_pixel(struct sky *s, size_t n, const double *ra, const double *dec,
                             double *x, double *y);
 
+/* 1 for a place 60 degrees or more from the reference point: where a projection does not show it, it is outside of any image. */
+int sky_far(const struct sky *s, double ra, double dec);
+
 /* 1 when the map is a plain TAN without distortion: linear pixel -> intermediate coordinates. */
 int sky_is_linear(const struct sky *s);
 

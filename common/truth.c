@@ -2,6 +2,7 @@
 #include "truth.h"
 #include "catkeys.h"
 #include "tableio.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -102,8 +103,8 @@ static int fill(struct truth *t, const struct scene *s, const double *x, const d
     for (int c = 0; c < TRUTH_COLUMNS; c++)
         to[c] = t->own.col[c].v.r;
     for (size_t i = 0; i < s->n; i++) {
-        to[TRUTH_X][i] = x[i] + 1;
-        to[TRUTH_Y][i] = y[i] + 1;
+        to[TRUTH_X][i] = isfinite(x[i]) ? x[i] + 1 : NAN;
+        to[TRUTH_Y][i] = isfinite(y[i]) ? y[i] + 1 : NAN;
         to[TRUTH_FLUX][i] = s->object[i].flux * exptime;
     }
     st = sky_from_pixel(t->sky, s->n, x, y, to[TRUTH_RA], to[TRUTH_DEC]);

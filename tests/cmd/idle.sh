@@ -27,6 +27,22 @@ idle pixel rrgshape noisy.fits cat.txt --stars stars.rrg --pixel 0.2
 idle pixel rrgshape noisy.fits cat.txt --psf none --pixel 0.2
 for o in fourth=plain psf-correction=first; do idle ${o%=*} rrgshape noisy.fits cat.txt --psf none --$o; done
 for o in width=2 width-min=0.2 width-max=0.5; do idle ${o%=*} rrgshape noisy.fits cat.txt --stars stars.rrg --fixed-width 3 --$o; done
+for o in library=models.txt models=made.txt mag-range=20,22 nmax=4 size=0.3 size-scatter=0.1 smoothing=0.1; do idle ${o%=*} galgen --stars -n 4 --$o; done
+for o in nmax=4 size=0.3 size-scatter=0.1 smoothing=0.1; do idle ${o%=*} galgen --library models.txt -n 4 --$o; done
+idle wavelengths psfgen --wavelengths 3
+idle wavelengths psfgen --bandwidth 0 --wavelengths 3
+for o in strut-angle=10 strut-width=0.1; do idle ${o%=*} psfgen --struts 0 --$o; done
+idle strut-angle psfgen --strut-width 0 --strut-angle 10
+idle obscuration-offset psfgen --obscuration 0 --obscuration-offset 0.1,0
+ok "psfgen: a band has wavelengths" psfgen --bandwidth 200 --wavelengths 3 --pupil-grid 32 --size 16 -o band.fits
+idle pixscale addnoise true.fits --read-noise 3 --pixscale 0.1
+fails "addnoise: no sky to subtract" 1 addnoise true.fits --read-noise 3 --subtract-sky -o made
+ok "addnoise: sky of 0, typed" addnoise true.fits --sky-rate 0 --subtract-sky -o none.fits
+perl -pe 's/EXPTIME =/XXPTIME =/' true.fits >timeless.fits
+fails "addnoise: a zeropoint without a time" 1 addnoise timeless.fits -z 25 -o made
+ok "addnoise: a zeropoint with a time" addnoise true.fits -z 25 -o zero.fits
+near "MAGZERO" "$(card zero.fits MAGZERO)" "$(awk 'BEGIN { print 25 + 2.5 * log(2000) / log(10) }')" 1e-4
+fails "detect: an rms of nothing" 2 detect noisy.fits --rms 0 -o made
 # noise twice, noise shared between exposures, one of several images, labels of other objects, cuts without their column
 fails "addnoise: an image that has noise" 1 addnoise noisy.fits -o made
 grep -q NOISSEED cmd.err && pass "the keyword is named" || fail "$(cat cmd.err)"

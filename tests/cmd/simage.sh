@@ -107,6 +107,22 @@ grep -q ' effects: PSF pixel$' plan.txt && pass "effects listed" || fail "effect
 printf '# X_IMAGE Y_IMAGE FLUX TYPE\n9e6 3 1 star\n3 3 1 star\n' >far.txt
 ok "an object 9e6 pixels away" simage far.txt -x 0.1 --size 5,5 -o far.fits
 near "the other is drawn" "$(stat far.fits 4)" 2000 0
+# the other side of the sky is outside, too
+printf '# RA DEC FLUX TYPE\n150 2.2 1 star\n330 -2.2 1 star\n150 -89 1 star\n' >behind.txt
+for o in "" "--wcs far.fits"; do
+    for p in "" "-p psf.fits" "-p psf.fits --method field"; do
+        [ -n "$o$p" ] || p=-q
+        # shellcheck disable=SC2086
+        simage behind.txt -x 0.1 --size 5,5 $o $p -v -o behind.fits 2>said.txt
+        near "behind the sky $o $p: objects that cannot be drawn" "$(grep -c "cannot be drawn" said.txt)" 0 0
+        [ "${p%field}" != "$p" ] || near "those outside or dark" "$(sed -n 's/simage: \([0-9]*\) outside or dark/\1/p' said.txt)" 2 0
+        # shellcheck disable=SC2086
+        head -2 behind.txt | simage - -x 0.1 --size 5,5 $o $p -q -o front.fits
+        near "the image is that of the other" "$(diffmax front.fits behind.fits)" 0 0
+    done
+done
+ok "behind the sky: the list with positions" simage behind.txt -x 0.1 --size 5,5 --truth truth.txt -o behind.fits
+near "its place in the image" "$(col truth.txt X_IMAGE | sed -n 2p | grep -ci nan)" 1 0
 printf '# DX DY FLUX TYPE\n' >empty.txt
 ok "an empty list" simage empty.txt -x 0.1 --size 5,5 -o e.fits
 near "gives zeros" "$(stat e.fits 4)" 0 0
@@ -116,6 +132,8 @@ fails "no pixel scale" 2 simage one.txt --size 5,5
 fails "no size" 2 simage one.txt -x 0.1
 fails "a number with a tail" 2 simage one.txt -x 0.1x --size 5,5
 fails "shear of 1" 2 simage one.txt -x 0.1 --size 5,5 --shear 0.8,0.7
+fails "a declination of 91" 2 simage one.txt -x 0.1 --size 5,5 --center 0,91
+fails "a declination of -91" 2 simage one.txt -x 0.1 --size 5,5 --center=0,-91
 fails "diffusion without a PSF" 2 simage one.txt -x 0.1 --size 5,5 --diffusion 0.04
 fails "half a pixel" 2 simage one.txt -x 0.1 --size 5.5,5
 fails "no such list" 1 simage none.txt -x 0.1 --size 5,5
