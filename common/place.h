@@ -19,7 +19,7 @@ struct place {
 
 /*
  * Pixel positions x[i], y[i] (the first centre is 0) of the objects of s, and with p->maps the matrix map[i] that acts on
- * the shape after its own shear.  NaN: the WCS cannot place it. E_NOMEM, E_DATA.
+ * the shape after its own shear.  NaN: the WCS cannot place it; infinite: on the other side of the sky. E_NOMEM, E_DATA.
  */
 MUST_CHECK int place_objects(const struct place *p, const struct scene *s, double *x, double *y, double (*map)[4]);
 
