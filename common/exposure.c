@@ -88,13 +88,11 @@ static int number(const struct header *h, const char *label, const char *key, do
 /* PIXSCALE against the scale of the WCS; either may be missing. */
 static int check_scale(const struct header *h, const char *label, double *scale, struct err *e)
 {
-    struct sky *s;
-    const int wcs = sky_open(&s, h, NULL);
+    double found, ratio;
+    const int wcs = sky_pixels(h, &found, &ratio, NULL);
     if (wcs == E_NOMEM)
         return err_set(e, wcs, "%s: %s", label, err_text(wcs));
     if (wcs == OK) {
-        const double found = sky_scale(s);
-        sky_close(s);
         if (isnan(*scale))
             *scale = found;
         else if (!(fabs(found - *scale) <= 1e-3 * *scale))

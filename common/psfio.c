@@ -167,11 +167,9 @@ static int sampling(const char *name, const struct header *h, const struct psf_o
         if (status != E_MISSING)
             return err_set(e, E_DATA, "%s: %s is not a positive number: give --psf-scale", name, keys[k]);
     }
-    struct sky *s = NULL;
-    if (sky_open(&s, h, NULL) != OK)
+    double ratio;
+    if (sky_pixels(h, scale, &ratio, NULL) != OK)
         return err_set(e, E_DATA, "%s: no PIXELSCL, PIXSCALE, GS_SCALE or WCS tells the PSF's sampling: give --psf-scale", name);
-    *scale = sky_scale(s);
-    sky_close(s);
     if (!(*scale > 0) || !isfinite(*scale))
         return err_set(e, E_DATA, "%s: the WCS gives no pixel scale: give --psf-scale", name);
     return OK;

@@ -4,6 +4,7 @@
  * coordinates are shifted by one (FITS counts from 1).
  */
 #include "sky.h"
+#include "frame.h"
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
@@ -22,6 +23,7 @@ struct sky {
     struct wcsprm *all;        /* as wcspih made them; NULL for a plain TAN */
     struct wcsprm two;         /* the two celestial axes of the primary one */
     int has_two;
+    enum frame frame;          /* of the two axes; positions that go in and out are J2000 */
     double scale;
 };
 
@@ -254,7 +256,8 @@ static int set_up(struct sky *s, struct err *e)
     return OK;
 }
 
-int sky_open(struct sky **out, const struct header *h, struct err *e)
+/* A WCS in whatever frame. */
+static int open_any(struct sky **out, const struct header *h, struct err *e)
 {
     *out = NULL;
     struct sky *s = calloc(1, sizeof *s);
@@ -283,6 +286,38 @@ int sky_open(struct sky **out, const struct header *h, struct err *e)
     else
         *out = s;
     return st;
+}
+
+int sky_open(struct sky **out, const struct header *h, struct err *e)
+{
+    int st = open_any(out, h, e);
+    if (st == OK)
+        st = frame_read(h, (*out)->two.lngtyp, &(*out)->frame, e);
+    if (st) {
+        sky_close(*out);
+        *out = NULL;
+    }
+    return st;
+}
+
+/* Ratio of the singular values of a matrix (a b; c d), >= 1. */
+static double axis_ratio(double a, double b, double c, double d)
+{
+    const double sum = hypot(a + d, b - c), difference = hypot(a - d, b + c);
+    return (sum + difference) / fabs(sum - difference);
+}
+
+int sky_pixels(const struct header *h, double *scale, double *ratio, struct err *e)
+{
+    struct sky *s;
+    const int st = open_any(&s, h, e);
+    if (st)
+        return st;
+    const double *pc = s->two.pc, *d = s->two.cdelt;
+    *scale = s->scale;
+    *ratio = axis_ratio(d[0] * pc[0], d[0] * pc[1], d[1] * pc[2], d[1] * pc[3]);
+    sky_close(s);
+    return OK;
 }
 
 /* One part of at most PART positions, forward (pixel to sky) or back: OK, E_RANGE for one or more of them, E_NOMEM. */
@@ -321,7 +356,16 @@ static int convert(struct sky *s, int forward, size_t n, const double *a, const 
     int all = OK;
     for (size_t at = 0; at < n && all != E_NOMEM; at += PART) {
         size_t k = n - at < PART ? n - at : PART;
-        int st = part(s, forward, k, a + at, b + at, to_a + at, to_b + at);
+        double lon[PART], lat[PART];
+        const int there = !forward && s->frame == FRAME_GALACTIC;
+        if (there) {
+            memcpy(lon, a + at, k * sizeof *lon);
+            memcpy(lat, b + at, k * sizeof *lat);
+            frame_to_galactic(k, lon, lat);
+        }
+        int st = part(s, forward, k, there ? lon : a + at, there ? lat : b + at, to_a + at, to_b + at);
+        if (forward && s->frame == FRAME_GALACTIC)
+            frame_from_galactic(k, to_a + at, to_b + at);
         all = st ? st : all;
     }
     return all;
@@ -347,6 +391,14 @@ int sky_far(const struct sky *s, double ra, double dec)
 int sky_is_linear(const struct sky *s)
 {
     return !strcmp(s->two.cel.prj.code, "TAN") && !s->two.lin.dispre && !s->two.lin.disseq;
+}
+
+void sky_reference(const struct sky *s, double *ra, double *dec)
+{
+    *ra = s->two.crval[s->two.lng];
+    *dec = s->two.crval[s->two.lat];
+    if (s->frame == FRAME_GALACTIC)
+        frame_from_galactic(1, ra, dec);
 }
 
 double sky_scale(const struct sky *s)

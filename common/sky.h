@@ -3,7 +3,8 @@
  * wcs.h.  TAN with CD is written; whatever wcslib reads (SIP, TPV) is read.
  *
  * Pixel coordinates here count from 0 (centre of the first pixel is 0,0);
- * angles are degrees.
+ * angles are degrees; positions on the sky are right ascension and declination
+ * J2000, whatever the axes of the header (frame.h).
  */
 #ifndef PIXSHEAR_SKY_H
 #define PIXSHEAR_SKY_H
@@ -14,7 +15,10 @@
 
 struct sky;
 
-/* From the WCS cards of a header. E_MISSING when there is no celestial WCS; e tells the cause. */
+/*
+ * From the WCS cards of a header. E_MISSING when there is no celestial WCS, E_DATA when it cannot be
+ * used or its frame cannot be converted to J2000; e tells the cause.
+ */
 MUST_CHECK int sky_open(struct sky **s, const struct header *h, struct err *e);
 void sky_close(struct sky *s);
 
@@ -32,6 +36,15 @@ int sky_is_linear(const struct sky *s);
 
 /* Pixel scale, arcsec: sqrt |det CD| * 3600 at the reference point. */
 double sky_scale(const struct sky *s);
+
+/* Its reference point CRVAL, J2000. */
+void sky_reference(const struct sky *s, double *ra, double *dec);
+
+/*
+ * Pixels of the WCS of a header, in whatever frame: scale as above, and the ratio of the longest to
+ * the shortest diameter of a round pixel's image on the sky, 1 when pixels are square.
+ */
+MUST_CHECK int sky_pixels(const struct header *h, double *scale, double *ratio, struct err *e);
 
 /*
  * Write the standard TAN of this project into h: RA---TAN, DEC--TAN, ICRS,

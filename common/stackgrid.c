@@ -192,8 +192,7 @@ static int first_grid(struct stack *s, double factor, double scale, struct err *
         double crval[2], crpix[2];
         crpix[0] = header_double_or(&s->hdr, "CRPIX1", NAN);
         crpix[1] = header_double_or(&s->hdr, "CRPIX2", NAN);
-        crval[0] = header_double_or(&s->hdr, "CRVAL1", NAN);
-        crval[1] = header_double_or(&s->hdr, "CRVAL2", NAN);
+        sky_reference(first->sky, &crval[0], &crval[1]);
         exposure_remove_wcs(&s->hdr);
         st = sky_set_tan(&s->hdr, scale, crpix[0], crpix[1], crval[0], crval[1]);
     }

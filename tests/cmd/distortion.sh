@@ -92,3 +92,23 @@ fails "no WCS" 1 simage s.txt --models m.txt -x 0.1 --wcs none.fits -o no.fits
 fails "no such file" 1 simage s.txt --models m.txt -x 0.1 --wcs absent.fits -o no.fits
 fails "onto the WCS's file" 1 simage s.txt --models m.txt -x 0.1 --wcs plain.fits -o plain.fits
 fails "the truth onto the WCS's file" 1 simage s.txt --models m.txt -x 0.1 --wcs plain.fits --truth plain.fits -o no.fits
+
+# galactic axes: (150, 2.2) there is (63.605103, 54.039755) of J2000, as astropy has it; other frames are refused by name
+near_wcs galactic.fits GLON-TAN GLAT-TAN 61 51 -$c 0 0 $c
+printf '# RA DEC FLUX TYPE\n63.605103 54.039755 100 star\n' >one.txt
+ok "a star through galactic axes" simage one.txt -p psf.fits -x 0.1 --wcs galactic.fits --truth truth.txt -o g.fits
+near "lies at CRPIX, x" "$(col truth.txt X_IMAGE)" 61 0.3; near "and y" "$(col truth.txt Y_IMAGE)" 51 0.3
+detect g.fits --rms 0.1 -o g.cat
+near "detect tells its RA" "$(col g.cat ALPHA_J2000)" 63.605103 2e-5; near "and Dec" "$(col g.cat DELTA_J2000)" 54.039755 1e-5
+ok "drizzled to a grid of RA and Dec" drizzle g.fits --size 121,101 -o d.fits
+detect "d.fits[SCI]" --rms 0.1 -o d.cat
+near "it is still there, RA" "$(col d.cat ALPHA_J2000)" 63.605103 2e-5; near "and Dec" "$(col d.cat DELTA_J2000)" 54.039755 1e-5
+for f in "FK4 of EQUINOX 1950|RADESYS = 'FK4'|EQUINOX =               1950.0" "FK5 of EQUINOX 1975|RADESYS = 'FK5'|EQUINOX =               1975.0" "axes ELON|X|X"; do
+    IFS='|' read -r what one two <<<"$f"
+    if [ "$one" = X ]; then near_wcs other.fits ELON-TAN ELAT-TAN 61 51 -$c 0 0 $c; else near_wcs other.fits RA---TAN DEC--TAN 61 51 -$c 0 0 $c "$one" "$two"; fi
+    fails "simage --wcs, $what" 1 simage one.txt -p psf.fits -x 0.1 --wcs other.fits -o no.fits
+    if grep -q "$what" cmd.err; then pass "is told"; else fail "simage: $(cat cmd.err)"; fi
+    ok "detect, $what" detect other.fits --rms 0.1 -o o.cat
+    grep -q "$what.*no positions on the sky" cmd.err && pass "is warned of" || fail "detect: $(cat cmd.err)"
+    if grep -q ALPHA_J2000 o.cat; then fail "ALPHA_J2000 of $what"; else pass "and gives no ALPHA_J2000"; fi
+done

@@ -4,6 +4,7 @@
  * polynomials by hand.
  */
 #include "check.h"
+#include "frame.h"
 #include "sky.h"
 #include <stdlib.h>
 #include <string.h>
@@ -269,8 +270,116 @@ static void test_number_of_axes(void)
     check_that(with_card("WCSAXES", "WCSAXES =                   32", &e) == E_DATA && strstr(e.text, "singular"), "32 axes: what lacks is their matrix: %s", e.text);
 }
 
+/* Galactic places and their J2000 as astropy 5.2 has them (by way of FK5, 0.02 arcsec from ICRS). */
+static void test_galactic(void)
+{
+    static const double place[][4] = {{0, 0, 266.4049883, -28.9361778}, {122.93192, 27.12825, 310.1677470, 89.9999947}, {150, 2.2, 63.6051030, 54.0397547}, {236.8, 42.1, 150.0919545, 2.2067208}, {10, 89.9, 192.9629228, 27.0892508}};
+    struct check c = check_begin("galactic to J2000 against astropy, arcsec on the sky"), back = check_begin("and back, arcsec");
+    for (size_t k = 0; k < sizeof place / sizeof *place; k++) {
+        double lon = place[k][0], lat = place[k][1];
+        frame_from_galactic(1, &lon, &lat);
+        check_close(&c, (lon - place[k][2]) * cos(lat * degree) * 3600, 0, 0.03);
+        check_close(&c, (lat - place[k][3]) * 3600, 0, 0.03);
+        frame_to_galactic(1, &lon, &lat);
+        check_close(&back, (lon - place[k][0]) * cos(lat * degree) * 3600, 0, 1e-8);
+        check_close(&back, (lat - place[k][1]) * 3600, 0, 1e-8);
+    }
+    check_end(&c);
+    check_end(&back);
+
+    struct header h = tan_header(0.1, 10, 20, 236.8, 42.1);
+    if (header_set_str(&h, "CTYPE1", "GLON-TAN", NULL) || header_set_str(&h, "CTYPE2", "GLAT-TAN", NULL))
+        abort();
+    struct sky *s = opened(&h);
+    const double x = 9, y = 19, px = 500, py = -300;
+    double ra, dec, r, d, bx = 0, by = 0;
+    sky_reference(s, &r, &d);
+    int st = sky_from_pixel(s, 1, &x, &y, &ra, &dec);
+    c = check_begin("a galactic map: its reference pixel, arcsec");
+    check_close(&c, st == OK ? (ra - place[3][2]) * 3600 : NAN, 0, 0.04);
+    check_close(&c, (dec - place[3][3]) * 3600, 0, 0.03);
+    check_close(&c, (r - ra) * 3600, 0, 1e-8);
+    check_close(&c, (d - dec) * 3600, 0, 1e-8);
+    check_end(&c);
+    c = check_begin("there and back, pixels");
+    if (sky_from_pixel(s, 1, &px, &py, &ra, &dec) || sky_to_pixel(s, 1, &ra, &dec, &bx, &by))
+        abort();
+    check_close(&c, bx, px, 1e-7);
+    check_close(&c, by, py, 1e-7);
+    check_end(&c);
+    sky_close(s);
+    header_free(&h);
+}
+
+/* The header of a plain TAN with the cards of a frame: what sky_open says. */
+static int with_frame(const char *const card[3], const char *longitude, struct err *e)
+{
+    struct header h = tan_header(0.1, 10, 20, 150, 2.2);
+    struct sky *s = NULL;
+    char type[2][9] = {"RA---TAN", "DEC--TAN"};
+    header_remove(&h, "RADESYS");
+    if (strcmp(longitude, "RA") != 0) {
+        memcpy(type[0], longitude, 4);
+        memcpy(type[1], (char[]){longitude[0], 'L', 'A', 'T', 0}, 4);
+    }
+    if (header_set_str(&h, "CTYPE1", type[0], NULL) || header_set_str(&h, "CTYPE2", type[1], NULL))
+        abort();
+    for (int i = 0; i < 3 && card[i]; i++)
+        if (header_append(&h, card[i]))
+            abort();
+    double scale = 0, ratio = 0;
+    const int st = sky_open(&s, &h, e);
+    check_that(sky_pixels(&h, &scale, &ratio, NULL) == OK && fabs(scale - 0.1) < 1e-12 && fabs(ratio - 1) < 1e-12, "%s: the pixels are told",
+               card[0] ? card[0] : longitude);
+    sky_close(s);
+    header_free(&h);
+    return st;
+}
+
+static void test_frames(void)
+{
+    static const char *const good[][3] = {{0}, {"RADESYS = 'ICRS    '"}, {"RADESYS = 'ICRS    '", "EQUINOX =               2000.0"}, {"RADESYS = 'FK5     '"},
+        {"RADESYS = 'FK5     '", "EQUINOX =               2000.0"}, {"RADECSYS= 'FK5     '", "EQUINOX =                 2000"}, {"EQUINOX =               2000.0"},
+        {"EQUINOX = 'J2000'"}, {"EPOCH   =               2000.0"}, {"EQUINOX =               2000.0", "EPOCH   =               1953.5"}, {"EPOCH   =                  0.0"},
+        {"RADESYS = 'ICRS    '", "EQUINOX =               1950.0"}, {"RADESYS = 'fk5'"}, {"EQUINOX = '2000.0'"}};
+    static const char *const bad[][3] = {{"RADESYS = 'FK4     '"}, {"RADESYS = 'FK4     '", "EQUINOX =               1950.0"}, {"EQUINOX =               1950.0"},
+        {"EPOCH   =               1950.0"}, {"RADESYS = 'FK5     '", "EQUINOX =               1975.0"}, {"EQUINOX =               2012.5"}, {"EQUINOX = 'B1950'"},
+        {"RADESYS = 'GAPPT   '", "EQUINOX =               2000.0"}, {"RADESYS = 'FK4-NO-E'"}, {"RADECSYS= 'FK4     '"}, {"EQUINOX = 'soon'"}, {"RADESYS =                    5"}};
+    struct err e = {""};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        e.text[0] = 0;
+        check_that(with_frame(good[i], "RA", &e) == OK, "%s is J2000: %s", good[i][0] ? good[i][0] : "no word", e.text);
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        check_that(with_frame(bad[i], "RA", &e) == E_DATA, "%s is refused: %s", bad[i][0], e.text);
+    check_that(with_frame((const char *const[3]){0}, "ELON", &e) == E_DATA && strstr(e.text, "ELON"), "ecliptic axes: %s", e.text);
+    check_that(with_frame((const char *const[3]){"RADESYS = 'FK4     '"}, "GLON", &e) == OK, "galactic axes have no RADESYS");
+}
+
+/* Pixels that are not square: rectangles, and squares seen askew. */
+static void test_pixels(void)
+{
+    static const double matrix[][5] = {{-2, 0, 0, 2, 1}, {0, 3, 3, 0, 1}, {-1, 0, 0, 2, 2}, {0.6, 0.8, -0.8, 0.6, 1}, {1, 0.1, 0, 1, 1.105124921972504}, {0.6, -1.6, 0.8, 1.2, 2}};
+    struct check c = check_begin("ratio of a pixel's diameters on the sky");
+    for (size_t k = 0; k < sizeof matrix / sizeof *matrix; k++) {
+        static const char *const key[] = {"CD1_1", "CD1_2", "CD2_1", "CD2_2"};
+        struct header h = tan_header(0.1, 10, 20, 150, 2.2);
+        double scale = 0, ratio = NAN;
+        for (int i = 0; i < 4; i++)
+            set(&h, key[i], 1e-5 * matrix[k][i]);
+        if (sky_pixels(&h, &scale, &ratio, NULL))
+            abort();
+        check_close(&c, ratio, matrix[k][4], 1e-12);
+        header_free(&h);
+    }
+    check_end(&c);
+}
+
 int main(void)
 {
+    test_galactic();
+    test_frames();
+    test_pixels();
     test_text_without_end();
     test_number_of_axes();
     test_tan();
