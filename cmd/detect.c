@@ -41,6 +41,8 @@ struct options {
 /* The image with what its header says, options first. */
 struct frame {
     struct image im, other;    /* other: --measure */
+    struct pixels pixels, other_pixels;
+    struct fits_in *in;        /* has the pixels where im has none, else NULL */
     float *map, *other_map;    /* rms per pixel or NULL */
     char unit[72];             /* of the fluxes */
     double scale;              /* arcsec per pixel, 0 unknown */
@@ -147,21 +149,32 @@ static void check_outputs(const struct options *o, const char *out)
 /* Images and maps, and `more`, must fit. */
 static void check_memory(const struct frame *f, const char *in, const struct options *o, const struct common *c, double more)
 {
-    double need = (double)image_count(&f->im) * (4 + (o->weight ? 4 : 0) + (o->measure ? 4 : 0) + (o->measure_weight ? 4 : 0)) + 32 * 1048576.0 + more;
+    double need = (double)image_count(&f->im) * ((f->im.pix ? 4 : 0) + (o->weight ? 4 : 0) + (o->measure ? 4 : 0) + (o->measure_weight ? 4 : 0)) + 32 * 1048576.0 + more;
     if (need > c->max_memory)
         die(EXIT_RUN, "%s: needs %.0f MB of memory: raise --max-memory", in, need / 1e6);
+}
+
+/* The image: its pixels stay in the file, unless they are changed or asked for again when outputs are being written. */
+static void read_image(struct frame *f, const char *in, const struct options *o, const struct common *c)
+{
+    struct err e;
+    const int keep = !o->mask && o->checks.n == 0;
+    if (keep ? image_open(&f->im, &f->pixels, &f->in, in, c->max_memory, &e) : image_read(&f->im, in, c->max_memory, &e))
+        die(EXIT_RUN, "%s", e.text);
+    if (!f->in)
+        f->pixels = pixels_of(&f->im);
 }
 
 static void read_frame(struct frame *f, const char *in, const struct options *o, const struct opt *own,
                        const struct common *c)
 {
     struct err e;
-    if (image_read(&f->im, in, c->max_memory, &e))
-        die(EXIT_RUN, "%s", e.text);
+    read_image(f, in, o, c);
     pages_keep(image_count(&f->im) * sizeof(float));
     check_memory(f, in, o, c, 0);
     if (o->measure)
         read_beside(&f->other, o->measure, &f->im, c->max_memory);
+    f->other_pixels = pixels_of(&f->other);
     const struct header *h = &f->im.hdr, *flux = o->measure ? &f->other.hdr : h;
     struct exposure x = {0};
     if (exposure_keywords(h, in, &x, &e))
@@ -220,7 +233,7 @@ static struct detect_params plan(const struct frame *f, const char *in, const st
 {
     struct detect_params p = o->p;
     const struct header *h = o->measure ? &f->other.hdr : &f->im.hdr;
-    p.measure = o->measure ? &f->other : NULL;
+    p.measure = o->measure ? &f->other_pixels : NULL;
     p.measure_map = f->other_map;
     p.threads = c->threads;
     p.clean = !o->no_clean;
@@ -301,13 +314,15 @@ static int check_row(enum check_type type, const struct frame *f, const struct d
         return OK;
     }
     if (type == SUBTRACTED) {
-        background_subtract(&d->background, f->im.pix + at, y, 0, nx, NAN, row);
+        pixels_row(&f->pixels, y, 0, nx, row);
+        background_subtract(&d->background, y, 0, nx, NAN, row);
         return OK;
     }
     memset(row, 0, (size_t)nx * sizeof *row);
     for (size_t i = d->label.row[y]; i < d->label.row[y + 1]; i++) {
         const struct label_run *r = &d->label.run[i];
-        background_subtract(&d->background, f->im.pix + at + r->x0, y, r->x0, r->x1 - r->x0, 0, row + r->x0);
+        pixels_row(&f->pixels, y, r->x0, r->x1 - r->x0, row + r->x0);
+        background_subtract(&d->background, y, r->x0, r->x1 - r->x0, 0, row + r->x0);
         for (long x = r->x0; f->map && x < r->x1; x++)
             row[x] = f->map[at + (size_t)x] <= FLT_MAX ? row[x] : 0;
     }
@@ -372,7 +387,7 @@ static void write_check(const char *text, const struct frame *f, const struct de
     }
     for (long y = 0; y < f->im.ny && type == FILTERED && !st; y += BAND) {
         const long many = f->im.ny - y < BAND ? f->im.ny - y : BAND;
-        st = segment_filtered(&f->im, &d->background, f->map, p->filter, p->negative, y, many, row);
+        st = segment_filtered(&f->pixels, &d->background, f->map, p->filter, p->negative, y, many, row);
         st = st ? err_set(&e, st, "%s: %s", name, err_text(st)) : fits_out_rows(out, many, row, &e);
     }
     for (long y = 0; y < f->im.ny && type != SEGMENTATION && type != FILTERED && !st; y++) {
@@ -438,12 +453,22 @@ static void write_count(const struct common *c, const struct detection *d, const
 static void detect_or_die(const struct frame *f, const char *in, const struct options *o,
                           const struct detect_params *p, struct detection *d)
 {
-    int st = detect_run(&f->im, f->map, o->weight_type != WEIGHT_RMS, p, d);
+    int st = detect_run(&f->pixels, f->map, o->weight_type != WEIGHT_RMS, p, d);
     if (st == E_DATA)
         die(EXIT_RUN, "%s: no usable pixel: all are blank, masked or without weight", in);
     if (st == E_SINGULAR)
         die(EXIT_RUN, "%s: the background has no noise (constant image): give --rms", in);
     run(st, in);
+}
+
+/* The pixels are not needed any more: were they the same to the end? */
+static void leave_image(struct frame *f)
+{
+    struct err e;
+    if (f->in && fits_in_unchanged(f->in, &e))
+        die(EXIT_RUN, "%s", e.text);
+    fits_in_close(f->in);
+    f->in = NULL;
 }
 
 /* CPU seconds, good to a factor 2 at the depth of the experiment: a start, the pixels, some hundred objects per arcmin^2. */
@@ -456,7 +481,7 @@ static double predict(const struct frame *f, const struct detect_params *p)
 static void describe(const struct frame *f, const char *in, const struct detect_params *p)
 {
     static const char *const way[] = {"none", "a Gaussian", "a row times a column", "summed as a whole", "by transforms of tiles"};
-    double mb = ((double)image_count(&f->im) * (f->map ? 8 : 4) + p->threads * smooth_bytes(p->filter, f->im.nx)) / 1e6;
+    double mb = ((double)image_count(&f->im) * ((f->im.pix ? 4 : 0) + (f->map ? 4 : 0)) + p->threads * smooth_bytes(p->filter, f->im.nx)) / 1e6;
     fprintf(stderr, "detect: %s: %ld x %ld pixels of %g arcsec, kernel %d x %d (%s), gain %g, zero point %g, "
             "about %.0f MB and %.2g s\n", in, f->im.nx, f->im.ny, f->scale, 2 * p->filter->reach + 1, 2 * p->filter->radius + 1, way[p->filter->way],
             p->phot.gain, f->zeropoint, mb + 8, predict(f, p));
@@ -479,7 +504,7 @@ static void outputs_ready(const struct options *o, const struct common *c, const
 }
 
 /* Detect and write everything that was asked for. */
-static void search(const struct frame *f, const struct program *prog, const struct opt *own, const struct options *o,
+static void search(struct frame *f, const struct program *prog, const struct opt *own, const struct options *o,
                    const struct common *c, const struct detect_params *p, const char *const *inputs, size_t n_inputs)
 {
     const char *in = inputs[0];
@@ -492,6 +517,7 @@ static void search(const struct frame *f, const struct program *prog, const stru
     progress_begin(&bar, "detect", DETECT_STEPS, c->quiet);
     timespec_get(&begin, TIME_UTC);
     detect_or_die(f, in, o, &with_bar, &d);
+    leave_image(f);
     timespec_get(&end, TIME_UTC);
     progress_end(&bar);
     if (c->verbose)
@@ -664,6 +690,7 @@ int main(int argc, char **argv)
     free(f.map);
     free(f.other_map);
     sky_close(f.sky);
+    fits_in_close(f.in);
     image_free(&f.im);
     image_free(&f.other);
     opt_free(own);

@@ -294,7 +294,7 @@ double background_median(double *v, long n)
 /* ---- the cells ---- */
 
 struct cells {
-    const struct image *im;
+    const struct pixels *im;
     const float *rms_map;
     const struct background_params *p;
     long mx, my;
@@ -303,37 +303,32 @@ struct cells {
     struct darksky *dark;          /* NULL: not asked for */
 };
 
-/* Copy rows of a cell one after the other; 0 when a pixel is not finite (with rms: or has no finite rms). */
-WIDE static int copy_cell(const float *restrict pix, const float *restrict rms, size_t stride, long n, long rows,
-                          float *restrict buf)
+/* Are all of them finite? */
+WIDE static int all_finite(const float *v, long n)
 {
     int32_t bad = 0;
-    for (long y = 0; y < rows; y++, pix += stride, buf += n) {
-        for (long x = 0; x < n; x++) {
-            buf[x] = pix[x];
-            bad |= !(fabsf(pix[x]) <= FLT_MAX);
-        }
-        if (!rms)
-            continue;
-        for (long x = 0; x < n; x++)
-            bad |= !(rms[x] <= FLT_MAX);
-        rms += stride;
-    }
+    for (long i = 0; i < n; i++)
+        bad |= !(fabsf(v[i]) <= FLT_MAX);
     return !bad;
 }
 
 /* Copy the good pixels of one cell; returns how many. */
 static long gather(const struct cells *c, long x0, long x1, long y0, long y1, float *buf)
 {
-    size_t stride = (size_t)c->im->nx, at = (size_t)y0 * stride + (size_t)x0;
-    const float *pix = c->im->pix + at, *rms = c->rms_map ? c->rms_map + at : NULL;
-    if (copy_cell(pix, rms, stride, x1 - x0, y1 - y0, buf))
-        return (x1 - x0) * (y1 - y0);
+    const size_t stride = (size_t)c->im->nx;
+    const long nx = x1 - x0, ny = y1 - y0;
+    const float *rms = c->rms_map ? c->rms_map + (size_t)y0 * stride + (size_t)x0 : NULL;
+    pixels_box(c->im, (struct box){x0, y0, nx, ny}, buf);
+    int good = all_finite(buf, nx * ny);
+    for (long y = 0; rms && y < ny && good; y++)
+        good = all_finite(rms + (size_t)y * stride, nx);
+    if (good)
+        return nx * ny;
     long n = 0;
-    for (long y = y0; y < y1; y++, pix += stride, rms = rms ? rms + stride : NULL)
-        for (long x = 0; x < x1 - x0; x++)
-            if (fabsf(pix[x]) <= FLT_MAX && (!rms || rms[x] <= FLT_MAX))
-                buf[n++] = pix[x];
+    for (long y = 0; y < ny; y++, rms = rms ? rms + stride : NULL)
+        for (long x = 0; x < nx; x++)
+            if (fabsf(buf[y * nx + x]) <= FLT_MAX && (!rms || rms[x] <= FLT_MAX))
+                buf[n++] = buf[y * nx + x];
     return n;
 }
 
@@ -345,9 +340,8 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
     double gain = c->dark ? c->p->gain : 0;
     size_t room = (size_t)(nx / c->mx + 1) * (size_t)(ny / c->my + 1);
     float *buf = malloc(room * sizeof *buf);
-    if (!buf)
-        return E_NOMEM;
-    for (long j = begin; j < end; j++) {
+    int st = buf ? OK : E_NOMEM;
+    for (long j = begin; j < end && !st; j++) {
         long y0 = j * ny / c->my, y1 = (j + 1) * ny / c->my;
         c->bad[j] = nx * (y1 - y0);
         for (long i = 0; i < c->mx; i++) {
@@ -360,11 +354,11 @@ static int measure_rows(void *ctx, long begin, long end, int worker)
             else if (n > 0 && c->mx * c->my == 1)
                 background_clip(buf, n, gain, c->p->removed, &c->level[at], &c->sigma[at]);
         }
-        if (c->dark)
-            darksky_rows(c->dark, c->im, c->rms_map, y0, y1);
+        if (c->dark && !st)
+            st = darksky_rows(c->dark, c->im, c->rms_map, y0, y1);
     }
     free(buf);
-    return OK;
+    return st;
 }
 
 /* The level once more, from the blocks between objects. */
@@ -488,7 +482,7 @@ static void natural(const double *v, long n, long step, double *d2, double *w)
 }
 
 /* Node tables: values, d2/dx2, d2/dy2 of both. */
-static int mesh_new(struct mesh *m, const struct image *im, long mx, long my, const double *v,
+static int mesh_new(struct mesh *m, const struct pixels *im, long mx, long my, const double *v,
                     double pivot)
 {
     size_t n = (size_t)mx * (size_t)my, side = (size_t)(mx > my ? mx : my);
@@ -698,28 +692,27 @@ WIDE static void fill_pieces(const struct piece *p, int count, float dt, float *
     }
 }
 
-/* out = finite(pix) ? (pix - pivot) - mesh : blank */
-WIDE static void subtract_pieces(const struct piece *p, int count, float dt, const float *restrict pix, float pivot,
-                                 float blank, float *restrict out)
+/* v = finite(v) ? (v - pivot) - mesh : blank */
+WIDE static void subtract_pieces(const struct piece *p, int count, float dt, float pivot, float blank, float *restrict v)
 {
     for (int k = 0; k < count; k++) {
         struct piece q = p[k];
         for (int i = q.from; i < q.to; i++) {
-            float v = (pix[i] - pivot) - piece_at(&q, dt, i);
-            out[i] = fabsf(v) <= FLT_MAX ? v : blank;
+            float d = (v[i] - pivot) - piece_at(&q, dt, i);
+            v[i] = fabsf(d) <= FLT_MAX ? d : blank;
         }
     }
 }
 
-/* The same pixels of one piece in `rows` rows, each with its cubic; the rows of pix and out are so far apart. */
-WIDE static void subtract_column(const struct piece *p, long rows, float dt, const float *restrict pix, size_t pix_stride,
-                                 float pivot, float blank, float *restrict out, size_t out_stride)
+/* The same pixels of one piece in `rows` rows, each with its cubic; the rows of v are so far apart. */
+WIDE static void subtract_column(const struct piece *p, long rows, float dt, float pivot, float blank, float *restrict v,
+                                 size_t stride)
 {
-    for (long r = 0; r < rows; r++, pix += pix_stride, out += out_stride) {
+    for (long r = 0; r < rows; r++, v += stride) {
         struct piece q = p[r];
         for (int i = q.from; i < q.to; i++) {
-            float v = (pix[i] - pivot) - piece_at(&q, dt, i);
-            out[i] = fabsf(v) <= FLT_MAX ? v : blank;
+            float d = (v[i] - pivot) - piece_at(&q, dt, i);
+            v[i] = fabsf(d) <= FLT_MAX ? d : blank;
         }
     }
 }
@@ -741,20 +734,18 @@ double mesh_at(const struct mesh *m, long x, long y)
     return m->pivot + (double)v;
 }
 
-void background_subtract(const struct background *b, const float *pix, long y, long x0, long n,
-                         float blank, float *out)
+void background_subtract(const struct background *b, long y, long x0, long n, float blank, float *v)
 {
     const struct mesh *m = &b->level;
     struct piece p[PIECES];
     double h = (double)m->mx / (double)m->nx;
     for (long done = 0, k = interval_of(m, h, x0); done < n;) {
         int count = next_pieces(m, h, y, x0, n, &k, &done, p);
-        subtract_pieces(p, count, (float)h, pix, (float)m->pivot, blank, out);
+        subtract_pieces(p, count, (float)h, (float)m->pivot, blank, v);
     }
 }
 
-void background_subtract_box(const struct background *b, const float *pix, size_t stride, struct box box, float blank,
-                             float *out)
+void background_subtract_box(const struct background *b, struct box box, float blank, float *v)
 {
     enum { ROWS = 64 };
     const struct mesh *m = &b->level;
@@ -771,8 +762,7 @@ void background_subtract_box(const struct background *b, const float *pix, size_
                 p[r].from = (int32_t)done;
                 p[r].to = (int32_t)stop;
             }
-            subtract_column(p, rows, (float)h, pix + (size_t)y * stride, stride, (float)m->pivot, blank,
-                            out + y * box.nx, (size_t)box.nx);
+            subtract_column(p, rows, (float)h, (float)m->pivot, blank, v + y * box.nx, (size_t)box.nx);
         }
         done = stop;
     }
@@ -824,7 +814,7 @@ static int finish(struct background *b, struct cells *c)
     return st;
 }
 
-int background_measure(struct background *b, const struct image *im, const float *rms_map,
+int background_measure(struct background *b, const struct pixels *im, const float *rms_map,
                        const struct background_params *p)
 {
     if (p->cell < 4 || p->filter < 1 || p->filter % 2 == 0)

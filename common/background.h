@@ -13,8 +13,8 @@
 #define PIXSHEAR_BACKGROUND_H
 
 #include "err.h"
-#include "image.h"
 #include "par.h"
+#include "pixels.h"
 
 /* A smooth function on nx x ny pixels, given at the centres of mx x my cells. */
 struct mesh {
@@ -56,7 +56,7 @@ void background_clip(const float *v, long n, double gain, double removed, double
  * usable pixel.  When some cells have noise, cells without any (borders of
  * exact zeros) count as bad.
  */
-MUST_CHECK int background_measure(struct background *b, const struct image *im, const float *rms_map,
+MUST_CHECK int background_measure(struct background *b, const struct pixels *im, const float *rms_map,
                                   const struct background_params *p);
 void background_free(struct background *b);
 
@@ -66,16 +66,11 @@ void mesh_row(const struct mesh *m, long y, long x0, long n, float *out);
 /* Value at one pixel, pivot included. */
 double mesh_at(const struct mesh *m, long x, long y);
 
-/* out[i] = pix[i] - level at (x0 + i, y), NaN and infinite pixels become `blank`. */
-void background_subtract(const struct background *b, const float *pix, long y, long x0, long n,
-                         float blank, float *out);
+/* v[i] -= level at (x0 + i, y); NaN and infinite pixels become `blank`. */
+void background_subtract(const struct background *b, long y, long x0, long n, float blank, float *v);
 
-/* The same for a box of pixels: its rows are `stride` apart from pix on, and one after the other in out. */
-struct box {
-    long x0, y0, nx, ny;
-};
-void background_subtract_box(const struct background *b, const float *pix, size_t stride, struct box box, float blank,
-                             float *out);
+/* The same for a box of pixels, its rows one after the other in v. */
+void background_subtract_box(const struct background *b, struct box box, float blank, float *v);
 
 /* Median of n doubles (v is reordered); mean of the middle two for even n. */
 double background_median(double *v, long n);

@@ -15,12 +15,14 @@ static int by_value(const void *a, const void *b)
 }
 
 /* Median of a regular sample of the finite pixels, 0 without any. */
-static double typical(const struct image *im)
+static double typical(const struct pixels *im)
 {
     float v[SAMPLE];
-    size_t n = 0, all = image_count(im);
+    const size_t nx = (size_t)im->nx, all = nx * (size_t)im->ny;
+    size_t n = 0;
     for (size_t i = 0; i < SAMPLE; i++) {
-        float p = im->pix[all / SAMPLE * i + all % SAMPLE * i / SAMPLE];
+        const size_t at = all / SAMPLE * i + all % SAMPLE * i / SAMPLE;
+        float p = pixels_at(im, (long)(at % nx), (long)(at / nx));
         if (fabsf(p) <= FLT_MAX)
             v[n++] = p;
     }
@@ -28,7 +30,7 @@ static double typical(const struct image *im)
     return n ? (double)v[n / 2] : 0;
 }
 
-int darksky_new(struct darksky *d, const struct image *im)
+int darksky_new(struct darksky *d, const struct pixels *im)
 {
     long nx = im->nx / B, ny = im->ny / B;
     float *mean = malloc(((size_t)nx * (size_t)ny + 1) * sizeof *mean);
@@ -58,17 +60,16 @@ WIDE static void block_sums(const float *a, const float *b, const float *c, cons
     }
 }
 
-/* Mean of the good pixels of a block that has bad ones; NaN when more than half are bad. */
-static float block_mean(const struct image *im, const float *rms_map, long x0, long y0, double pivot)
+/* Mean of the good pixels of a block that has bad ones, from its upper left pixel and rms on; NaN when more than half are bad. */
+static float block_mean(const float *pix, const float *rms, size_t stride, double pivot)
 {
     double sum = 0;
     int n = 0;
-    for (long y = y0; y < y0 + B; y++)
-        for (long x = x0; x < x0 + B; x++) {
-            size_t at = (size_t)y * (size_t)im->nx + (size_t)x;
-            if (!(fabsf(im->pix[at]) <= FLT_MAX) || (rms_map && !(rms_map[at] <= FLT_MAX)))
+    for (int y = 0; y < B; y++, pix += stride, rms = rms ? rms + stride : NULL)
+        for (int x = 0; x < B; x++) {
+            if (!(fabsf(pix[x]) <= FLT_MAX) || (rms && !(rms[x] <= FLT_MAX)))
                 continue;
-            sum += (double)im->pix[at] - pivot;
+            sum += (double)pix[x] - pivot;
             n++;
         }
     return 2 * n >= B * B ? (float)(sum / n) : NAN;
@@ -82,21 +83,26 @@ WIDE static int any_bad(const float *v, long n)
     return bad;
 }
 
-void darksky_rows(struct darksky *d, const struct image *im, const float *rms_map, long y0, long y1)
+int darksky_rows(struct darksky *d, const struct pixels *im, const float *rms_map, long y0, long y1)
 {
+    const size_t nx = (size_t)im->nx;
+    float *row = malloc(B * nx * sizeof *row);
+    if (!row)
+        return E_NOMEM;
     for (long j = (y0 + B - 1) / B; j < d->ny && j * B < y1; j++) {
-        const float *row[B];
+        const float *rms = rms_map ? rms_map + (size_t)(j * B) * nx : NULL;
         float *out = d->mean + j * d->nx;
         int bad = 0;
-        for (int k = 0; k < B; k++) {
-            row[k] = im->pix + (size_t)(j * B + k) * (size_t)im->nx;
-            bad |= rms_map && any_bad(rms_map + (size_t)(j * B + k) * (size_t)im->nx, d->nx * B);
-        }
-        block_sums(row[0], row[1], row[2], row[3], (float)d->pivot, d->nx, out);
+        for (size_t k = 0; k < B && rms; k++)
+            bad |= any_bad(rms + k * nx, d->nx * B);
+        pixels_box(im, (struct box){0, j * B, im->nx, B}, row);
+        block_sums(row, row + nx, row + 2 * nx, row + 3 * nx, (float)d->pivot, d->nx, out);
         for (long i = 0; i < d->nx; i++)
             if (bad || !(fabsf(out[i]) <= FLT_MAX))
-                out[i] = block_mean(im, rms_map, i * B, j * B, d->pivot);
+                out[i] = block_mean(row + i * B, rms ? rms + i * B : NULL, nx, d->pivot);
     }
+    free(row);
+    return OK;
 }
 
 /* Mean of 3 x 3 blocks; the border is repeated. NaN next to a bad block. */

@@ -11,7 +11,7 @@
 #define PIXSHEAR_DARKSKY_H
 
 #include "err.h"
-#include "image.h"
+#include "pixels.h"
 
 enum { DARKSKY_BLOCK = 4 };
 
@@ -22,11 +22,11 @@ struct darksky {
 };
 
 /* Room for the blocks of an image; one without any (a side below 4) is fine. */
-MUST_CHECK int darksky_new(struct darksky *d, const struct image *im);
+MUST_CHECK int darksky_new(struct darksky *d, const struct pixels *im);
 void darksky_free(struct darksky *d);
 
 /* Average the blocks whose first row is one of y0..y1-1. */
-void darksky_rows(struct darksky *d, const struct image *im, const float *rms_map, long y0, long y1);
+MUST_CHECK int darksky_rows(struct darksky *d, const struct pixels *im, const float *rms_map, long y0, long y1);
 
 /*
  * Level of the blocks wholly inside x0 <= x < x1, y0 <= y < y1, starting from

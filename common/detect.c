@@ -36,37 +36,40 @@ static void cell_box(const struct mesh *m, long i, long j, long box[4])
 }
 
 /* Median over the cells of measured rms / rms of the map; 0 when there is none. */
-static int map_ratio(const struct image *im, const struct background *b, const float *map, double *scale)
+static int map_ratio(const struct pixels *im, const struct background *b, const float *map, double *scale)
 {
     const struct mesh *m = &b->rms;
     double *ratio = malloc((size_t)m->mx * (size_t)m->my * sizeof *ratio);
-    if (!ratio)
-        return E_NOMEM;
+    float *pix = malloc((size_t)(im->nx / m->mx + 1) * sizeof *pix);
     long n = 0;
-    for (long j = 0; j < m->my; j++)
+    for (long j = 0; j < m->my && ratio && pix; j++)
         for (long i = 0; i < m->mx; i++) {
             long box[4], good = 0;
             double sum = 0;
             cell_box(m, i, j, box);
-            for (long y = box[2]; y < box[3]; y++)
-                for (long x = box[0]; x < box[1]; x++) {
-                    size_t at = (size_t)y * (size_t)im->nx + (size_t)x;
-                    if (map[at] <= FLT_MAX && fabsf(im->pix[at]) <= FLT_MAX) {
-                        sum += (double)map[at] * (double)map[at];
+            for (long y = box[2]; y < box[3]; y++) {
+                const float *rms = map + (size_t)y * (size_t)im->nx + (size_t)box[0];
+                pixels_row(im, y, box[0], box[1] - box[0], pix);
+                for (long x = 0; x < box[1] - box[0]; x++)
+                    if (rms[x] <= FLT_MAX && fabsf(pix[x]) <= FLT_MAX) {
+                        sum += (double)rms[x] * (double)rms[x];
                         good++;
                     }
-                }
+            }
             double sigma = m->pivot + m->node[j * m->mx + i];
             if (good * 4 >= (box[1] - box[0]) * (box[3] - box[2]) && sigma > 0)
                 ratio[n++] = sigma / sqrt(sum / (double)good);
         }
-    *scale = n ? background_median(ratio, n) : 0;
+    const int st = ratio && pix ? OK : E_NOMEM;
+    if (!st)
+        *scale = n ? background_median(ratio, n) : 0;
     free(ratio);
-    return OK;
+    free(pix);
+    return st;
 }
 
 /* Scale the map to the noise measured, or to rms where that is given. */
-static int scale_map(const struct image *im, const struct background *b, float *map, double rms)
+static int scale_map(const struct pixels *im, const struct background *b, float *map, double rms)
 {
     double scale;
     int st = map_ratio(im, b, map, &scale);
@@ -76,7 +79,7 @@ static int scale_map(const struct image *im, const struct background *b, float *
         scale *= rms / b->mean_rms;
     if (!(scale > 0))
         return E_SINGULAR;
-    for (size_t i = 0; i < image_count(im); i++)
+    for (size_t i = 0; i < pixels_count(im); i++)
         map[i] *= (float)scale;
     return OK;
 }
@@ -85,7 +88,7 @@ static int scale_map(const struct image *im, const struct background *b, float *
  * rms of the filtered image over that of the pixels: the white-noise value, or
  * what a sample of cells shows when that is more than 5 % above it (correlated noise).
  */
-static int filtered_noise(const struct image *im, const struct background *b, const float *map,
+static int filtered_noise(const struct pixels *im, const struct background *b, const float *map,
                           const struct smooth *filter, int negative, double noise, double *result)
 {
     double white = smooth_noise(filter);
@@ -95,7 +98,8 @@ static int filtered_noise(const struct image *im, const struct background *b, co
     const struct mesh *m = &b->rms;
     long strips = m->my < 5 ? m->my : 4 + m->my / 16, tall = m->ny / m->my + 1, n = 0;
     float *rows = malloc((size_t)tall * (size_t)im->nx * sizeof *rows);
-    float *cell = malloc((size_t)tall * (size_t)(im->nx / m->mx + 1) * sizeof *cell);
+    const size_t wide = (size_t)(im->nx / m->mx + 1);
+    float *cell = malloc((size_t)(tall + 1) * wide * sizeof *cell), *pix = cell ? cell + (size_t)tall * wide : NULL;
     double *ratio = malloc((size_t)strips * (size_t)m->mx * sizeof *ratio);
     int st = rows && cell && ratio ? OK : E_NOMEM;
     for (long s = 0; s < strips && !st; s++) {
@@ -105,13 +109,14 @@ static int filtered_noise(const struct image *im, const struct background *b, co
         for (long i = 0; i < m->mx && !st; i++) {
             long k = 0;
             cell_box(m, i, j, box);
-            for (long y = box[2]; y < box[3]; y++)
-                for (long x = box[0]; x < box[1]; x++) {
-                    size_t at = (size_t)y * (size_t)im->nx + (size_t)x;
-                    float v = rows[(y - box[2]) * im->nx + x];
-                    if (fabsf(im->pix[at]) <= FLT_MAX && (!map || map[at] <= FLT_MAX))
-                        cell[k++] = map ? v / map[at] : v;
-                }
+            for (long y = box[2]; y < box[3]; y++) {
+                const float *v = rows + (y - box[2]) * im->nx + box[0];
+                const float *rms = map ? map + (size_t)y * (size_t)im->nx + (size_t)box[0] : NULL;
+                pixels_row(im, y, box[0], box[1] - box[0], pix);
+                for (long x = 0; x < box[1] - box[0]; x++)
+                    if (fabsf(pix[x]) <= FLT_MAX && (!rms || rms[x] <= FLT_MAX))
+                        cell[k++] = rms ? v[x] / rms[x] : v[x];
+            }
             double level, sigma, pixel = map ? 1 : m->pivot + m->node[j * m->mx + i];
             if (k * 4 < (box[1] - box[0]) * (box[3] - box[2]) || !(pixel > 0))
                 continue;
@@ -198,7 +203,7 @@ static void label_runs(const struct split *t, const size_t *base, const int32_t 
     }
 }
 
-static int label_all(const struct image *im, const struct split *t, const size_t *base, const int32_t *number, struct labels *l)
+static int label_all(const struct pixels *im, const struct split *t, const size_t *base, const int32_t *number, struct labels *l)
 {
     struct labels made;
     int st = labels_new(&made, im->nx, im->ny);
@@ -218,7 +223,7 @@ static int label_all(const struct image *im, const struct split *t, const size_t
 }
 
 /* Clean, number the objects that stay, pack their blobs, label their pixels. */
-static int settle(const struct image *im, const struct detect_params *p, struct par_team *team, const struct split *t,
+static int settle(const struct pixels *im, const struct detect_params *p, struct par_team *team, const struct split *t,
                   const size_t *base, struct blob_list *all, struct detection *d)
 {
     size_t n = all->n, kept = 0;
@@ -247,7 +252,7 @@ static int settle(const struct image *im, const struct detect_params *p, struct 
 }
 
 /* Segments to blobs and labels. */
-static int separate(const struct image *im, const float *map, const struct detect_params *p, struct par_team *team,
+static int separate(const struct pixels *im, const float *map, const struct detect_params *p, struct par_team *team,
                     const struct segments *s, struct blob_list *all, struct detection *d)
 {
     long tasks = (long)((s->ncomponent + COMPONENTS - 1) / COMPONENTS);
@@ -255,7 +260,7 @@ static int separate(const struct image *im, const float *map, const struct detec
         .levels = p->levels, .contrast = p->contrast, .min_area = p->min_area, .rms_map = map,
         .branch_area = p->min_area < BRANCH ? p->min_area : BRANCH,
         .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx,
-        .most = DETECT_MOST + image_count(im) / DETECT_PART
+        .most = DETECT_MOST + pixels_count(im) / DETECT_PART
     };
     struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)), malloc((s->ncomponent + 1) * sizeof(int32_t)),
                           calloc((size_t)tasks + 1, sizeof(struct blob_list)),
@@ -311,7 +316,7 @@ static int measure_objects(void *ctx, long begin, long end, int worker)
     return st;
 }
 
-static int measure_all(const struct image *im, const float *map, int relative, const struct detect_params *p,
+static int measure_all(const struct pixels *im, const float *map, int relative, const struct detect_params *p,
                        struct par_team *team, const struct blob_list *all, struct detection *d)
 {
     struct photometry_params phot = p->phot;
@@ -345,7 +350,7 @@ static int measure_all(const struct image *im, const float *map, int relative, c
 }
 
 /* Background, noise and threshold into d. */
-static int prepare(const struct image *im, float *map, int relative, const struct detect_params *p,
+static int prepare(const struct pixels *im, float *map, int relative, const struct detect_params *p,
                    const struct smooth *filter, struct par_team *team, struct detection *d)
 {
     struct background_params bp = {p->back_cell, p->back_filter, p->phot.gain, p->sky_removed, team, p->dark_sky};
@@ -366,7 +371,7 @@ static int prepare(const struct image *im, float *map, int relative, const struc
     return st;
 }
 
-int detect_run(const struct image *im, float *rms_map, int relative, const struct detect_params *p,
+int detect_run(const struct pixels *im, float *rms_map, int relative, const struct detect_params *p,
                struct detection *d)
 {
     struct detection out = {0};

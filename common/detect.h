@@ -1,7 +1,7 @@
 /*
  * detect.h - from an image to measured objects: background, filter, threshold,
  * deblending, cleaning, photometry.  Linear in pixels plus detected pixels;
- * 4 bytes per pixel, 4 more with a weight map, plus 12 bytes for each detected
+ * 4 bytes per pixel of an image in memory (none of one that stays in its file, pixels.h), 4 with a weight map, plus 12 bytes for each detected
  * pixel and 14 for each run of them while objects are being separated, and up to
  * 90 for the pixels of the component in hand: a component larger than DETECT_MOST
  * pixels and a DETECT_PART of the image is not split, gets the flag
@@ -13,9 +13,9 @@
 
 #include "background.h"
 #include "err.h"
-#include "image.h"
 #include "labels.h"
 #include "photometry.h"
+#include "pixels.h"
 #include "smooth.h"
 #include <stdint.h>
 
@@ -41,7 +41,7 @@ struct detect_params {
     int negative;
     int threads;
     struct photometry_params phot;     /* noise and rms_map are filled in */
-    const struct image *measure;       /* photometry in this image of the same size; NULL: in the same one */
+    const struct pixels *measure;      /* photometry in this image of the same size; NULL: in the same one */
     float *measure_map;                /* its rms per pixel, as rms_map of detect_run(), or NULL */
     struct progress *progress;         /* of DETECT_STEPS; or NULL */
 };
@@ -77,7 +77,7 @@ void detect_weights(float *map, size_t n, enum weight_type type);
  * it is scaled in place so that its median agrees with the noise measured on
  * the meshes.  E_DATA: no usable pixel; E_SINGULAR: no noise (constant image).
  */
-MUST_CHECK int detect_run(const struct image *im, float *rms_map, int relative,
+MUST_CHECK int detect_run(const struct pixels *im, float *rms_map, int relative,
                           const struct detect_params *p, struct detection *d);
 void detection_free(struct detection *d);
 

@@ -16,7 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { BLOCK = 128 << 10, CARD = 80, IMAGE_SIDE = 65535 };
+enum { BLOCK = 128 << 10, CARD = 80 };
 
 /* An HDU that is not complete. */
 struct part {

@@ -58,6 +58,8 @@ struct fits_in {
     struct unpack **unpack;    /* decoder of each tile-compressed HDU, NULL until its pixels are read */
     double max_memory;
     int chosen;                /* HDU of the name's suffix, -1 without a suffix */
+    const struct fits_unit *shown;     /* of image_open: the HDU, and its data in memory */
+    const unsigned char *shown_at;
 };
 
 #endif

@@ -5,7 +5,7 @@
 
 static int take(struct image *im, long nx, long ny, int clear)
 {
-    if (nx < 1 || ny < 1 || nx > 65535 || ny > 65535)
+    if (nx < 1 || ny < 1 || nx > IMAGE_SIDE || ny > IMAGE_SIDE)
         return E_RANGE;
     size_t n = (size_t)nx * (size_t)ny;
     float *pix = clear ? calloc(n, sizeof *pix) : pages_block(n * sizeof *pix);

@@ -13,13 +13,15 @@
 #include "header.h"
 #include <stddef.h>
 
+enum { IMAGE_SIDE = 65535 };   /* the longest */
+
 struct image {
     long nx, ny;
     float *pix;            /* nx * ny, owned */
     struct header hdr;     /* cards of the HDU, without the structural ones */
 };
 
-/* nx*ny zeros and an empty header; sides 1..65535. E_RANGE, E_NOMEM. */
+/* nx*ny zeros and an empty header; sides 1..IMAGE_SIDE. E_RANGE, E_NOMEM. */
 MUST_CHECK int image_new(struct image *im, long nx, long ny);
 
 /* The same with pixels of no particular value, for whoever sets all of them. */

@@ -74,6 +74,15 @@ MUST_CHECK int fits_in_rows(struct fits_in *f, int index, long z, long y0, long 
 MUST_CHECK int fits_in_rows_double(struct fits_in *f, int index, long z, long y0, long nrow,
                                    double *out, struct err *e);
 
+/*
+ * The selected image without its pixels: im gets its size and its header, *at the pixels where the input has them, and *f,
+ * which holds them, stays open.  What must be decoded is read into im, and *f is NULL.  fits_in_unchanged tells at the end
+ * whether the file is still the one that was opened; see filemap.h on what happens when it is cut.
+ */
+struct pixels;
+MUST_CHECK int image_open(struct image *im, struct pixels *at, struct fits_in **f, const char *name, double max_memory, struct err *e);
+MUST_CHECK int fits_in_unchanged(const struct fits_in *f, struct err *e);
+
 /* Open, read the selected image with its header, close. */
 MUST_CHECK int image_read(struct image *im, const char *name, double max_memory, struct err *e);
 

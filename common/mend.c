@@ -6,18 +6,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-int mend_new(struct mend *m, const struct image *im, const struct background *b, const float *rms_map)
+int mend_new(struct mend *m, const struct pixels *im, const struct background *b, const float *rms_map)
 {
-    unsigned char *above = calloc((size_t)im->nx, 1);
-    if (!above)
-        return E_NOMEM;
-    *m = (struct mend){im, b, rms_map, 0, above};
-    return OK;
+    *m = (struct mend){im, b, rms_map, 0, calloc((size_t)im->nx, 1), malloc((size_t)im->nx * sizeof(float))};
+    if (m->above && m->row)
+        return OK;
+    mend_free(m);
+    return E_NOMEM;
 }
 
 void mend_free(struct mend *m)
 {
     free(m->above);
+    free(m->row);
     *m = (struct mend){0};
 }
 
@@ -43,40 +44,39 @@ WIDE static void count_above(const unsigned char *restrict kind, long n, unsigne
     }
 }
 
-static int is_good(const struct mend *m, size_t at)
+static int is_good(const struct mend *m, long x, long y)
 {
-    return fabsf(m->im->pix[at]) <= FLT_MAX && (!m->rms_map || m->rms_map[at] <= FLT_MAX);
+    return fabsf(pixels_at(m->im, x, y)) <= FLT_MAX && (!m->rms_map || m->rms_map[(size_t)y * (size_t)m->im->nx + (size_t)x] <= FLT_MAX);
 }
 
 void mend_seek(struct mend *m, long y)
 {
-    const size_t nx = (size_t)m->im->nx;
+    const long nx = m->im->nx;
     m->y = y;
-    memset(m->above, 0, nx);
+    memset(m->above, 0, (size_t)nx);
     if (y <= 0 || y > m->im->ny)
         return;
-    for (size_t x = 0; x < nx; x++)
-        while (m->above[x] <= MEND_MOST && m->above[x] < y && !is_good(m, (size_t)(y - 1 - m->above[x]) * nx + x))
+    for (long x = 0; x < nx; x++)
+        while (m->above[x] <= MEND_MOST && m->above[x] < y && !is_good(m, x, y - 1 - m->above[x]))
             m->above[x]++;
 }
 
 /* The pixels up and down of a bad one with good ones behind them; 0 when there are too many. */
 static int column_gap(const struct mend *m, long x, long *up, long *down)
 {
-    const size_t nx = (size_t)m->im->nx;
     *up = m->y - 1 - m->above[x];
     if (*up < 0)
         return 0;
     for (*down = m->y + 1; *down - *up - 1 <= MEND_MOST && *down < m->im->ny; ++*down)
-        if (is_good(m, (size_t)*down * nx + (size_t)x))
+        if (is_good(m, x, *down))
             return 1;
     return 0;
 }
 
 static float sky_less(const struct mend *m, long x, long y)
 {
-    float v;
-    background_subtract(m->b, m->im->pix + (size_t)y * (size_t)m->im->nx + (size_t)x, y, x, 1, 0, &v);
+    float v = pixels_at(m->im, x, y);
+    background_subtract(m->b, y, x, 1, 0, &v);
     return v;
 }
 
@@ -111,10 +111,10 @@ static void mend_gap(const struct mend *m, long from, long end, float *v, unsign
 void mend_row(struct mend *m, float *v, unsigned char *kind, float *rms)
 {
     const long nx = m->im->nx;
-    const size_t at = (size_t)m->y * (size_t)nx;
     if (rms)
-        memcpy(rms, m->rms_map + at, (size_t)nx * sizeof *rms);
-    int any = kinds_of(m->im->pix + at, rms, nx, kind);
+        memcpy(rms, m->rms_map + (size_t)m->y * (size_t)nx, (size_t)nx * sizeof *rms);
+    pixels_row(m->im, m->y, 0, nx, m->row);
+    int any = kinds_of(m->row, rms, nx, kind);
     for (long x = 0, end; any && x < nx; x = end + 1) {
         const unsigned char *bad = memchr(kind + x, PIXEL_BAD, (size_t)(nx - x));
         if (!bad)

@@ -11,22 +11,23 @@
 
 #include "background.h"
 #include "err.h"
-#include "image.h"
+#include "pixels.h"
 
 enum { MEND_MOST = 16 };
 
 enum { PIXEL_GOOD, PIXEL_BAD, PIXEL_MENDED };
 
 struct mend {
-    const struct image *im;
+    const struct pixels *im;
     const struct background *b;
     const float *rms_map;  /* per pixel, not finite: bad; or NULL */
     long y;                /* the row that comes next */
     unsigned char *above;  /* per column: bad pixels directly above it, not counted beyond MEND_MOST + 1; owned */
+    float *row;            /* the pixels of the row; owned */
 };
 
 /* Scratch for the image; what it points to must stay. */
-MUST_CHECK int mend_new(struct mend *m, const struct image *im, const struct background *b, const float *rms_map);
+MUST_CHECK int mend_new(struct mend *m, const struct pixels *im, const struct background *b, const float *rms_map);
 void mend_free(struct mend *m);
 
 /* Row y comes next. */

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LANES = 8 };
+enum { LANES = 8, PIECE = 64 };           /* PIECE: pixels looked at at once where some may be bad */
 static const double KRON_REACH = 6;        /* ellipse of the Kron radius, rms radii */
 static const double FWHM_SIGMA = 2.3548200450309493;
 
@@ -57,15 +57,21 @@ void photometry_work_free(struct photometry_work *w)
 
 /* ---- the stamp ---- */
 
-static int is_good(const struct field *f, size_t at)
+static const float *rms_from(const struct field *f, long x, long y)
 {
-    return fabsf(f->im->pix[at]) <= FLT_MAX && (!f->p->rms_map || f->p->rms_map[at] <= FLT_MAX);
+    return f->p->rms_map ? f->p->rms_map + (size_t)y * (size_t)f->im->nx + (size_t)x : NULL;
+}
+
+static int is_good(const struct field *f, long x, long y)
+{
+    const float *rms = rms_from(f, x, y);
+    return fabsf(pixels_at(f->im, x, y)) <= FLT_MAX && (!rms || *rms <= FLT_MAX);
 }
 
 static int usable(const struct field *f, long x, long y, int32_t own)
 {
     int32_t label = labels_at(f->label, x, y);
-    return (label == 0 || label == own) && is_good(f, (size_t)y * (size_t)f->im->nx + (size_t)x);
+    return (label == 0 || label == own) && is_good(f, x, y);
 }
 
 WIDE static int finite_run(const float *v, long n)
@@ -74,6 +80,24 @@ WIDE static int finite_run(const float *v, long n)
     for (long i = 0; i < n; i++)
         bad |= !(fabsf(v[i]) <= FLT_MAX);
     return !bad;
+}
+
+/* bad[i] = 1 where pixel x + i of row y is bad; returns whether one is. */
+static int mark_bad(const struct field *f, long x, long y, long n, unsigned char *bad)
+{
+    int any = 0;
+    for (long done = 0; done < n; done += PIECE) {
+        float v[PIECE];
+        const long many = n - done < PIECE ? n - done : PIECE;
+        const float *rms = rms_from(f, x + done, y);
+        pixels_row(f->im, y, x + done, many, v);
+        if (finite_run(v, many) && (!rms || finite_run(rms, many)))
+            continue;
+        for (long i = 0; i < many; i++)
+            if (!(fabsf(v[i]) <= FLT_MAX) || (rms && !(rms[i] <= FLT_MAX)))
+                any = bad[done + i] = 1;
+    }
+    return any;
 }
 
 /* Mark what row y of the stamp has of other objects and of bad pixels; 1 when there is any. */
@@ -90,13 +114,7 @@ static int mark_row(const struct field *f, const struct stamp *s, long y, int32_
         memset(mark + (a - s->x0), 1, (size_t)(b - a));
         any = 1;
     }
-    size_t at = (size_t)row * (size_t)f->im->nx + (size_t)s->x0;
-    if (f->b->bad == 0 || (!f->p->rms_map && finite_run(f->im->pix + at, s->nx)))
-        return any;
-    for (long x = 0; x < s->nx; x++)
-        if (!is_good(f, at + (size_t)x))
-            any = mark[x] = 1;
-    return any;
+    return f->b->bad ? mark_bad(f, s->x0, row, s->nx, mark) | any : any;
 }
 
 /* The marked pixels of row y: the pixel mirrored at the object when that is free, else 0. */
@@ -114,7 +132,8 @@ static void mirror_row(const struct field *f, struct stamp *s, double cx, double
             long m = inside_y * s->nx + inside_x;
             v[x] = s->replaced[m] ? 0 : s->v[m];
         } else if (mx >= 0 && my >= 0 && mx < f->im->nx && my < f->im->ny && usable(f, mx, my, own)) {
-            background_subtract(f->b, f->im->pix + (size_t)my * (size_t)f->im->nx + (size_t)mx, my, mx, 1, 0, &v[x]);
+            v[x] = pixels_at(f->im, mx, my);
+            background_subtract(f->b, my, mx, 1, 0, &v[x]);
         }
     }
 }
@@ -143,8 +162,9 @@ static int cut_stamp(const struct field *f, double cx, double cy, double hx, dou
     s->any_replaced = 0;
     memset(s->replaced, 0, n);
     memset(s->v + n, 0, LANES * sizeof *s->v);
-    background_subtract_box(f->b, f->im->pix + (size_t)y0 * (size_t)nx + (size_t)x0, (size_t)nx,
-                            (struct box){x0, y0, s->nx, s->ny}, 0, s->v);
+    const struct box box = {x0, y0, s->nx, s->ny};
+    pixels_box(f->im, box, s->v);
+    background_subtract_box(f->b, box, 0, s->v);
     for (long y = 0; y < s->ny; y++)
         s->any_replaced |= mark_row(f, s, y, own);
     for (long y = 0; y < s->ny && s->any_replaced; y++)
@@ -558,7 +578,6 @@ static void from_blob(const struct field *f, const struct blob *b, struct object
  */
 static void position_errors(const struct field *f, const struct blob *b, int32_t own, struct object *o)
 {
-    enum { PIECE = 64 };
     const struct labels *l = f->label;
     double photon = f->p->gain > 0 ? 1 / f->p->gain : 0, cor = correlation(f), rms2 = f->p->noise * f->p->noise, s[4] = {0};
     for (long y = b->ymin; y <= b->ymax; y++)
@@ -566,13 +585,17 @@ static void position_errors(const struct field *f, const struct blob *b, int32_t
             for (long x = l->run[i].x0; x < l->run[i].x1 && l->run[i].label == own; x += PIECE) {
                 float v[PIECE];
                 long n = l->run[i].x1 - x < PIECE ? l->run[i].x1 - x : PIECE;
-                size_t at = (size_t)y * (size_t)f->im->nx + (size_t)x;
-                background_subtract(f->b, f->im->pix + at, y, x, n, 0, v);
+                unsigned char bad[PIECE] = {0};
+                const float *map = rms_from(f, x, y);
+                pixels_row(f->im, y, x, n, v);
+                background_subtract(f->b, y, x, n, 0, v);
+                if (f->b->bad)
+                    mark_bad(f, x, y, n, bad);
                 for (long k = 0; k < n; k++) {
-                    if (f->b->bad && !is_good(f, at + (size_t)k))
+                    if (bad[k])
                         continue;
-                    double rms = f->p->rms_map ? (double)f->p->rms_map[at + (size_t)k] : 0;
-                    double var = cor * (f->p->rms_map ? rms * rms : rms2) + (v[k] > 0 ? (double)v[k] * photon : 0);
+                    double rms = map ? (double)map[k] : 0;
+                    double var = cor * (map ? rms * rms : rms2) + (v[k] > 0 ? (double)v[k] * photon : 0);
                     double dx = (double)(x + k) - o->x, dy = (double)y - o->y;
                     s[0] += var * dx * dx;
                     s[1] += var * dx * dy;
@@ -586,6 +609,16 @@ static void position_errors(const struct field *f, const struct blob *b, int32_t
     o->err_yy = (s[2] + line) / (b->s * b->s);
 }
 
+/* Is a pixel of the object at this place or next to it? */
+static int beside_own(const struct field *f, long x, long y, int32_t own)
+{
+    for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < f->im->ny; v++)
+        for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < f->im->nx; u++)
+            if (labels_at(f->label, u, v) == own)
+                return 1;
+    return 0;
+}
+
 /* A bad pixel inside or next to the isophote. */
 static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
 {
@@ -594,21 +627,16 @@ static int touches_bad(const struct field *f, const struct blob *b, int32_t own)
     long nx = f->im->nx, ny = f->im->ny;
     long x0 = b->xmin > 0 ? b->xmin - 1 : 0, x1 = b->xmax + 1 < nx ? b->xmax + 1 : nx - 1;
     long y0 = b->ymin > 0 ? b->ymin - 1 : 0, y1 = b->ymax + 1 < ny ? b->ymax + 1 : ny - 1;
-    for (long y = y0; y <= y1; y++) {
-        size_t row = (size_t)y * (size_t)nx;
-        if (finite_run(f->im->pix + row + x0, x1 - x0 + 1)
-            && (!f->p->rms_map || finite_run(f->p->rms_map + row + x0, x1 - x0 + 1)))
-            continue;
-        for (long x = x0; x <= x1; x++) {
-            size_t at = row + (size_t)x;
-            if (fabsf(f->im->pix[at]) <= FLT_MAX && (!f->p->rms_map || f->p->rms_map[at] <= FLT_MAX))
+    for (long y = y0; y <= y1; y++)
+        for (long x = x0, end; x <= x1; x = end) {
+            unsigned char bad[PIECE] = {0};
+            end = x1 + 1 - x < PIECE ? x1 + 1 : x + PIECE;
+            if (!mark_bad(f, x, y, end - x, bad))
                 continue;
-            for (long v = y > 0 ? y - 1 : 0; v <= y + 1 && v < ny; v++)
-                for (long u = x > 0 ? x - 1 : 0; u <= x + 1 && u < nx; u++)
-                    if (labels_at(f->label, u, v) == own)
-                        return 1;
+            for (long i = x; i < end; i++)
+                if (bad[i - x] && beside_own(f, i, y, own))
+                    return 1;
         }
-    }
     return 0;
 }
 
@@ -721,8 +749,8 @@ static struct blob sum_again(const struct field *f, const struct blob *blob, int
     for (long y = b.ymin; y <= b.ymax; y++)
         for (size_t i = labels_from(l, y, b.xmin); i < l->row[y + 1] && l->run[i].x0 <= b.xmax; i++)
             for (int32_t x = l->run[i].x0; x < l->run[i].x1 && l->run[i].label == own; x++) {
-                float v;
-                background_subtract(f->b, f->im->pix + (size_t)y * (size_t)f->im->nx + (size_t)x, y, x, 1, 0, &v);
+                float v = pixels_at(f->im, x, y);
+                background_subtract(f->b, y, x, 1, 0, &v);
                 b.flux += (double)v;
                 b.above += (double)v > b.threshold;
                 if ((double)v > b.peak) {

@@ -13,8 +13,8 @@
 #include "deblend.h"
 #include "err.h"
 #include "growth.h"
-#include "image.h"
 #include "labels.h"
+#include "pixels.h"
 #include <stdint.h>
 
 /* FLAGS; DETECT_BLENDED (2) and DETECT_UNSEPARATED (64) are in deblend.h. */
@@ -58,7 +58,7 @@ struct object {
 
 /* What photometry of one field needs; shared by threads. */
 struct field {
-    const struct image *im;
+    const struct pixels *im;
     const struct background *b;
     const struct labels *label;
     const struct photometry_params *p;

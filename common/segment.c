@@ -22,7 +22,7 @@ enum { STRIP = TILES_TALL, BLOCK = 64, RETURN = 1 << 19 };
 /* ---- filtered rows in order ---- */
 
 struct feeder {
-    const struct image *im;
+    const struct pixels *im;
     const struct background *b;
     const float *rms_map;
     const struct smooth *filter;
@@ -136,8 +136,8 @@ static void feeder_take(struct feeder *f, long y)
     if (y < 0 || y >= f->im->ny)
         return;
     float *plain = plain_row(f, y);
-    size_t at = (size_t)y * (size_t)nx;
-    background_subtract(f->b, f->im->pix + at, y, 0, nx, 0, plain);
+    pixels_row(f->im, y, 0, nx, plain);
+    background_subtract(f->b, y, 0, nx, 0, plain);
     if (f->kind)
         mend_row(&f->mend, plain, kind_row(f, y), rms_row(f, y));
     if (f->negative)
@@ -181,7 +181,7 @@ static void feeder_row(struct feeder *f, long y, float *out, const float **plain
     smooth_column(f->filter, f->window, nx, out);
 }
 
-int segment_filtered(const struct image *im, const struct background *b, const float *rms_map,
+int segment_filtered(const struct pixels *im, const struct background *b, const float *rms_map,
                      const struct smooth *filter, int negative, long y0, long n, float *out)
 {
     struct feeder f = {.im = im, .b = b, .rms_map = rms_map, .filter = filter, .negative = negative};
@@ -218,7 +218,7 @@ struct strip {
 static const uint32_t NOWHERE = UINT32_MAX;
 
 struct search {
-    const struct image *im;
+    const struct pixels *im;
     const struct background *b;
     const struct smooth *filter;
     const struct segment_params *p;
@@ -707,7 +707,7 @@ static int group_runs(struct segments *s, struct strip *strip, long n, long min_
     return st;
 }
 
-int segment_find(struct segments *s, const struct image *im, const struct background *b,
+int segment_find(struct segments *s, const struct pixels *im, const struct background *b,
                  const struct smooth *filter, const struct segment_params *p)
 {
     if (!(p->threshold > 0) || p->min_area < 1 || (!p->rms_map && !(p->noise > 0)))

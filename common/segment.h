@@ -12,8 +12,8 @@
 
 #include "background.h"
 #include "err.h"
-#include "image.h"
 #include "par.h"
+#include "pixels.h"
 #include "smooth.h"
 #include <stdint.h>
 
@@ -45,7 +45,7 @@ struct segment_params {
  * Find.  Bad pixels (b->bad says whether there are any) are bridged as mend.h says; those that stay bad
  * count as 0 in the filter and are never detected; the minimum area is one of good pixels; outside the image is 0.
  */
-MUST_CHECK int segment_find(struct segments *s, const struct image *im, const struct background *b,
+MUST_CHECK int segment_find(struct segments *s, const struct pixels *im, const struct background *b,
                             const struct smooth *filter, const struct segment_params *p);
 void segment_free(struct segments *s);
 
@@ -53,7 +53,7 @@ void segment_free(struct segments *s);
  * Filtered rows y0 .. y0+n-1 above background, for check images and noise
  * estimates: out has n * nx values.
  */
-MUST_CHECK int segment_filtered(const struct image *im, const struct background *b,
+MUST_CHECK int segment_filtered(const struct pixels *im, const struct background *b,
                                 const float *rms_map, const struct smooth *filter, int negative,
                                 long y0, long n, float *out);
 

@@ -6,6 +6,7 @@
  */
 #include "source.h"
 #include "fileio.h"
+#include "filemap.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -21,6 +22,7 @@ struct source {
     int fd;
     int plain;             /* read by pread from start; nothing is held */
     uint64_t start, size;  /* of a plain file */
+    struct filemap *map;   /* of it, or NULL */
     unsigned char *mem;    /* bytes 0 .. held of anything else */
     uint64_t held, cap, limit;
     int ended;
@@ -41,6 +43,7 @@ void source_close(struct source *s)
         return;
     if (s->gzip)
         inflateEnd(&s->z);
+    filemap_close(s->map);
     if (s->fd >= 0)
         close(s->fd);
     free(s->in);
@@ -267,8 +270,22 @@ int source_need(struct source *s, uint64_t end, uint64_t *have, struct err *e)
     return OK;
 }
 
+int source_map(struct source *s)
+{
+    return s->plain && !s->map ? filemap_open(&s->map, s->fd, s->start + s->size, s->name) : OK;
+}
+
+int source_unchanged(const struct source *s, struct err *e)
+{
+    if (s->map && !filemap_unchanged(s->map))
+        return err_set(e, E_DATA, "%s: was changed while it was read", s->name);
+    return OK;
+}
+
 const unsigned char *source_at(const struct source *s, uint64_t offset, size_t n)
 {
+    if (s->map)
+        return offset <= s->size && n <= s->size - offset ? filemap_bytes(s->map) + s->start + offset : NULL;
     if (s->plain || offset > s->held || n > s->held - offset)
         return NULL;
     return s->mem + offset;

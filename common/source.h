@@ -31,6 +31,14 @@ MUST_CHECK int source_need(struct source *s, uint64_t end, uint64_t *have, struc
 /* n bytes from offset into buf. E_DATA when the input ends before. */
 MUST_CHECK int source_read(struct source *s, uint64_t offset, void *buf, size_t n, struct err *e);
 
+/*
+ * Bring everything that source_need made readable within reach of source_at: a plain file is mapped (filemap.h), anything else
+ * is in memory already.  A plain file that cannot be mapped is a failure without harm: source_read goes on.
+ * source_unchanged: E_DATA when a file that was mapped is not the one it was.
+ */
+MUST_CHECK int source_map(struct source *s);
+MUST_CHECK int source_unchanged(const struct source *s, struct err *e);
+
 /* The n bytes at offset when they are in memory, else NULL (and source_read must be used). */
 const unsigned char *source_at(const struct source *s, uint64_t offset, size_t n);
 

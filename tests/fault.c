@@ -1,7 +1,7 @@
 /*
  * fault.c - preloaded library that makes the n-th call of a kind fail.
  *
- *   FAULT_KIND   malloc write read fsync rename linkat open close
+ *   FAULT_KIND   malloc write read fsync rename linkat open close mmap
  *   FAULT_AT     n, counting from 1; 0 only counts
  *   FAULT_LAST   1: every call after the n-th fails too
  *   FAULT_COUNT  file that gets the number of calls at exit
@@ -16,11 +16,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/types.h>
 #include <unistd.h>
 
-enum kind { MALLOC, WRITE, READ, FSYNC, RENAME, LINKAT, OPEN, CLOSE, KINDS };
-static const char *const names[KINDS] = {"malloc", "write", "read", "fsync", "rename", "linkat", "open", "close"};
+enum kind { MALLOC, WRITE, READ, FSYNC, RENAME, LINKAT, OPEN, CLOSE, MMAP, KINDS };
+static const char *const names[KINDS] = {"malloc", "write", "read", "fsync", "rename", "linkat", "open", "close", "mmap"};
 static int kind = -1, last;
 static long at;
 static atomic_long calls;
@@ -119,6 +120,13 @@ ssize_t pread64(int fd, void *b, size_t n, off_t o)
     NEXT(pread64);
     if (fails(READ)) { errno = EIO; return -1; }
     return real(fd, b, n, o);
+}
+
+void *mmap(void *p, size_t n, int prot, int flags, int fd, off_t o)
+{
+    NEXT(mmap);
+    if (fails(MMAP)) { errno = ENODEV; return MAP_FAILED; }
+    return real(p, n, prot, flags, fd, o);
 }
 
 int fsync(int fd)

@@ -1,5 +1,5 @@
-# Every program, with the n-th allocation, write, read, sync, rename, link, open
-# or close failing: it fails cleanly (status 1, one line, no output, nothing
+# Every program, with the n-th allocation, write, read, sync, rename, link, open,
+# close or mapping failing: it fails cleanly (status 1, one line, no output, nothing
 # left behind) or succeeds with the same bytes.
 so=$BUILD/fault.so
 if ldd "$BIN/psfgen" | grep -qE 'asan|tsan'; then skip "a sanitizer's build cannot preload a fault library"; exit 0; fi
@@ -31,7 +31,7 @@ sweep() { # NAME COMMAND...: the command writes to "out", and where it has two o
     [ ! -e second ] || mv second second.ref
     : >wrong
     local runs=0
-    for kind in malloc write read fsync rename linkat open close; do
+    for kind in malloc write read fsync rename linkat open close mmap; do
         rm -f out$ext
         FAULT_KIND=$kind FAULT_AT=0 FAULT_COUNT=count LD_PRELOAD=$so "$@" -o out$ext 2>err
         total=$(cat count); step=$((total / 12 + 1))

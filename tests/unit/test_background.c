@@ -58,7 +58,8 @@ static void plane(long nx, long ny, long cell)
             im.pix[y * nx + x] = (float)(1000 + 0.01 * (double)x - 0.02 * (double)y + draw((uint64_t)(y * nx + x)));
     struct background b;
     struct background_params p = {cell, 3, 0, 0, NULL, 0};
-    int st = background_measure(&b, &im, NULL, &p);
+    const struct pixels pix = pixels_of(&im);
+    int st = background_measure(&b, &pix, NULL, &p);
     if (!check_that(st == OK, "background of %ld x %ld in cells of %ld", nx, ny, cell))
         return;
     double worst = 0;
@@ -94,6 +95,7 @@ static void bad_pixels(void)
     struct background_params p = {32, 3, 0, 0, NULL, 0}, p2 = {32, 3, 0, 0, team, 0};
     if (image_new(&im, 200, 200))
         return;
+    const struct pixels pix = pixels_of(&im);
     for (long i = 0; i < 40000; i++)
         im.pix[i] = (float)(5 + draw((uint64_t)i));
     for (long y = 0; y < 70; y++)
@@ -102,8 +104,8 @@ static void bad_pixels(void)
     for (long y = 130; y < 200; y++)
         for (long x = 0; x < 200; x++)
             im.pix[y * 200 + x] = 0;
-    check_that(background_measure(&a, &im, NULL, &p) == OK, "bands of NaN and of exact zeros");
-    check_that(background_measure(&b, &im, NULL, &p2) == OK, "the same on two threads");
+    check_that(background_measure(&a, &pix, NULL, &p) == OK, "bands of NaN and of exact zeros");
+    check_that(background_measure(&b, &pix, NULL, &p2) == OK, "the same on two threads");
     par_team_free(team);
     struct check c = check_begin("level and rms where the image is blank or dead");
     for (long y = 0; y < 200; y += 9) {
@@ -117,10 +119,10 @@ static void bad_pixels(void)
     background_free(&b);
     for (long i = 0; i < 40000; i++)
         im.pix[i] = NAN;
-    check_that(background_measure(&a, &im, NULL, &p) == E_DATA, "all NaN is E_DATA");
+    check_that(background_measure(&a, &pix, NULL, &p) == E_DATA, "all NaN is E_DATA");
     for (long i = 0; i < 40000; i++)
         im.pix[i] = 7;
-    check_that(background_measure(&a, &im, NULL, &p) == OK && a.mean_rms == 0 && a.mean_level == 7,
+    check_that(background_measure(&a, &pix, NULL, &p) == OK && a.mean_rms == 0 && a.mean_level == 7,
                "a constant image has its level and no noise");
     background_free(&a);
     image_free(&im);

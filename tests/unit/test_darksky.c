@@ -9,11 +9,13 @@ enum { SIDE = 256 };
 static int level_of(const struct image *im, double start, double *level)
 {
     struct darksky d;
+    const struct pixels pix = pixels_of(im);
     *level = start;
-    if (darksky_new(&d, im))
+    if (darksky_new(&d, &pix))
         return E_NOMEM;
-    darksky_rows(&d, im, NULL, 0, im->ny);
-    int st = darksky_level(&d, 0, im->nx, 0, im->ny, 1, level);
+    int st = darksky_rows(&d, &pix, NULL, 0, im->ny);
+    if (!st)
+        st = darksky_level(&d, 0, im->nx, 0, im->ny, 1, level);
     darksky_free(&d);
     return st;
 }

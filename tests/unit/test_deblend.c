@@ -25,7 +25,8 @@ static int split(struct scene *c, double threshold, const struct deblend_params 
     b.level = (struct mesh){c->im.nx, c->im.ny, 1, 1, 0, node, NULL, NULL};
     struct segment_params sp = {threshold, 1, NULL, 1, 0, NULL};
     struct deblend_work *w;
-    if (smooth_new(&f, 0) || deblend_work_new(&w) || segment_find(&c->s, &c->im, &b, &f, &sp))
+    const struct pixels pix = pixels_of(&c->im);
+    if (smooth_new(&f, 0) || deblend_work_new(&w) || segment_find(&c->s, &pix, &b, &f, &sp))
         return 0;
     c->owner = malloc((c->s.npix + 1) * sizeof *c->owner);
     int good = 1;

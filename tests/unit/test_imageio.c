@@ -4,6 +4,7 @@
  */
 #include "check.h"
 #include "imageio.h"
+#include "pixels.h"
 #include <fcntl.h>
 #include <limits.h>
 #include <stdlib.h>
@@ -77,12 +78,42 @@ static void save(const struct bytes *f, const char *name)
         abort();
 }
 
+/* The pixels as they lie in the input are those of image_read, whole and in pieces. */
+static void check_open(const char *name, const struct image *read)
+{
+    struct image im = {0};
+    struct pixels at;
+    struct fits_in *f;
+    struct err e = {""};
+    if (!check_that(image_open(&im, &at, &f, name, 1e9, &e) == OK, "%s is opened%s%s", name, *e.text ? ": " : "", e.text))
+        return;
+    float *all = malloc(image_count(read) * sizeof *all), piece[4];
+    int same = all && im.nx == read->nx && im.ny == read->ny && im.hdr.n == read->hdr.n && at.nx == im.nx && at.ny == im.ny;
+    if (same) {
+        pixels_box(&at, (struct box){0, 0, at.nx, at.ny}, all);
+        same = !memcmp(all, read->pix, image_count(read) * sizeof *all);
+    }
+    for (long y = 0; same && y + 1 < at.ny; y++)
+        for (long x = 0; x + 1 < at.nx; x++) {
+            const float *p = read->pix + y * at.nx + x, last = pixels_at(&at, x + 1, y + 1);
+            pixels_box(&at, (struct box){x, y, 2, 2}, piece);
+            same &= !memcmp(piece, p, 8) && !memcmp(piece + 2, p + at.nx, 8) && !memcmp(&last, piece + 3, 4);
+        }
+    check_that(same, "%s: the same size, header and pixels as read", name);
+    check_that(!f || fits_in_unchanged(f, &e) == OK, "%s: unchanged", name);
+    free(all);
+    fits_in_close(f);
+    image_free(&im);
+}
+
 static struct image get(const char *name)
 {
     struct image im = {0};
     struct err e = {""};
     if (image_read(&im, name, 1e9, &e))
         check_that(0, "%s: %s", name, e.text);
+    else
+        check_open(name, &im);
     return im;
 }
 

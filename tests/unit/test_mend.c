@@ -56,13 +56,15 @@ int main(void)
     double node[4] = {0};
     struct background b = {.level = {NX, NY, 1, 1, 0, node, NULL, NULL}, .bad = 1};
     struct mend m;
-    if (!check_that(mend_new(&m, &im, &b, map) == OK, "scratch"))
+    const struct pixels pix = pixels_of(&im);
+    if (!check_that(mend_new(&m, &pix, &b, map) == OK, "scratch"))
         return check_status();
     static float v[N], rms[N], again[NX], rms_again[NX];
     static unsigned char kind[N], kind_again[NX];
     mend_seek(&m, 0);
     for (long y = 0; y < NY; y++) {
-        background_subtract(&b, im.pix + y * NX, y, 0, NX, 0, v + y * NX);
+        pixels_row(&pix, y, 0, NX, v + y * NX);
+        background_subtract(&b, y, 0, NX, 0, v + y * NX);
         mend_row(&m, v + y * NX, kind + y * NX, rms + y * NX);
     }
     struct check c = check_begin("bridged values and rms");
@@ -90,7 +92,8 @@ int main(void)
     int same = 1;
     for (long y = NY - 1; y >= 0; y -= 7) {
         mend_seek(&m, y);
-        background_subtract(&b, im.pix + y * NX, y, 0, NX, 0, again);
+        pixels_row(&pix, y, 0, NX, again);
+        background_subtract(&b, y, 0, NX, 0, again);
         mend_row(&m, again, kind_again, rms_again);
         same &= !memcmp(again, v + y * NX, sizeof again) && !memcmp(kind_again, kind + y * NX, sizeof kind_again)
                 && !memcmp(rms_again, rms + y * NX, sizeof rms_again);

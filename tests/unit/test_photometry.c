@@ -40,7 +40,8 @@ static int run(struct image *im, float *map, struct detect_params *p, struct det
 {
     p->rms = 1e-3;
     p->threshold = 10;
-    return detect_run(im, map, 0, p, d);
+    const struct pixels pix = pixels_of(im);
+    return detect_run(&pix, map, 0, p, d);
 }
 
 static void add_gauss(struct image *im, double x0, double y0, double flux, double sx, double sy, double theta)
@@ -215,7 +216,8 @@ static void scales(void)
         add_gauss(&im, 110, 90, 300, 3, 2, 1);
         for (uint64_t i = 0; i < SIDE * SIDE; i++)
             im.pix[i] = (float)((double)im.pix[i] * f);
-        int st = detect_run(&im, NULL, 0, &p, k ? &d : &a);
+        const struct pixels pix = pixels_of(&im);
+        int st = detect_run(&pix, NULL, 0, &p, k ? &d : &a);
         if (st || (k && d.n != a.n)) {
             check_that(0, "scaled by %g: status %d, %zu of %zu objects", f, st, d.n, a.n);
             continue;

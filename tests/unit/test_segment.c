@@ -47,6 +47,7 @@ static int compare(long nx, long ny, double threshold, long min_area, int nans, 
     if (image_new(&im, nx, ny) || smooth_new(&filter, 0))
         return 0;
     flat(&b, nx, ny, node);
+    const struct pixels pix = pixels_of(&im);
     size_t n = (size_t)(nx * ny);
     unsigned char *on = calloc(n, 1);
     long *label = malloc(n * sizeof *label), *size = calloc(n, sizeof *size), wanted = 0, pixels = 0;
@@ -64,7 +65,7 @@ static int compare(long nx, long ny, double threshold, long min_area, int nans, 
         wanted += size[i] >= min_area;
     struct par_team *team = par_team_new(2);
     struct segment_params p = {threshold, 1, rms, min_area, 0, team};
-    int good = segment_find(&s, &im, &b, &filter, &p) == OK && (long)s.ncomponent == wanted;
+    int good = segment_find(&s, &pix, &b, &filter, &p) == OK && (long)s.ncomponent == wanted;
     par_team_free(team);
     long *of = malloc((s.ncomponent + 1) * sizeof *of);
     for (size_t c = 0; good && c < s.ncomponent; c++) {
@@ -124,13 +125,14 @@ static void filtered(void)
     if (image_new(&im, NX, NY) || smooth_new(&f, 2.5))
         return;
     flat(&b, NX, NY, node);
+    const struct pixels pix = pixels_of(&im);
     for (uint64_t i = 0; i < NX * NY; i++)
         im.pix[i] = (float)rng_normal(&g, i, 0);
     static float whole[NX * NY], row[NX];
-    check_that(segment_filtered(&im, &b, NULL, &f, 0, 0, NY, whole) == OK, "all rows");
+    check_that(segment_filtered(&pix, &b, NULL, &f, 0, 0, NY, whole) == OK, "all rows");
     int same = 1;
     for (long y = 0; y < NY; y += 17)
-        same &= segment_filtered(&im, &b, NULL, &f, 0, y, 1, row) == OK && !memcmp(row, whole + y * NX, sizeof row);
+        same &= segment_filtered(&pix, &b, NULL, &f, 0, y, 1, row) == OK && !memcmp(row, whole + y * NX, sizeof row);
     check_that(same, "single rows have the same bits");
     double q = 0;
     for (long y = 10; y < NY - 10; y++)
@@ -144,7 +146,7 @@ static void filtered(void)
     struct par_team *team = par_team_new(2);
     struct segment_params p = {0.3, 1, NULL, 3, 0, NULL}, p2 = {0.3, 1, NULL, 3, 0, team};
     check_that(par_team_size(team) == 2 && par_team_size(NULL) == 1, "a team of two");
-    if (segment_find(&one, &im, &b, &f, &p) || segment_find(&two, &im, &b, &f, &p2))
+    if (segment_find(&one, &pix, &b, &f, &p) || segment_find(&two, &pix, &b, &f, &p2))
         return;
     par_team_free(team);
     check_that(one.nrun == two.nrun && !memcmp(one.run, two.run, one.nrun * sizeof *one.run)
