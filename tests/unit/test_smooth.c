@@ -110,13 +110,14 @@ static void kernel_sum(long kx, long ky, enum shape shape, long nx, long ny, enu
 {
     struct kernel k = made(kx, ky, shape, (uint64_t)(100 * kx + ky));
     struct image im = noise_image(nx, ny);
+    const struct pixels pix = pixels_of(&im);
     struct smooth s = {0};
     double node[2];
     struct background b = flat(nx, ny, node);
     float *out = malloc((size_t)(nx * ny) * sizeof *out), *row = malloc((size_t)nx * sizeof *row);
     int st = smooth_kernel(&s, &k, nx, ny);
     check_that(st == OK && s.way == way, "%ld x %ld for %ld x %ld pixels: way %d", kx, ky, nx, ny, (int)s.way);
-    if (st == OK && segment_filtered(&im, &b, NULL, &s, 0, 0, ny, out) == OK) {
+    if (st == OK && segment_filtered(&pix, &b, NULL, &s, 0, 0, ny, out) == OK) {
         struct check c = check_begin("rows against the sum over the kernel"), n = check_begin("noise factor");
         double sum = 0;
         for (long i = 0; i < kx * ky; i++)
@@ -130,7 +131,7 @@ static void kernel_sum(long kx, long ky, enum shape shape, long nx, long ny, enu
         check_end(&n);
         int same = 1;
         for (long y = 0; y < ny; y += 13)
-            same &= segment_filtered(&im, &b, NULL, &s, 0, y, 1, row) == OK && !memcmp(row, out + y * nx, (size_t)nx * sizeof *row);
+            same &= segment_filtered(&pix, &b, NULL, &s, 0, y, 1, row) == OK && !memcmp(row, out + y * nx, (size_t)nx * sizeof *row);
         check_that(same, "single rows have the same bits");
     }
     free(out);
