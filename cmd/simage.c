@@ -33,7 +33,6 @@
 #include <string.h>
 #include <time.h>
 
-#define FIELD_MARGIN 26.0      /* arcsec around the field of --method field */
 #define BASE_MB 12             /* what --check adds for program, libraries, PSF and the rows being drawn */
 #define BLOCK 16384            /* objects, or Gaussians of their profiles, that are planned and drawn together */
 
@@ -400,8 +399,10 @@ static void draw_field(struct input *in, const struct view *v, const struct requ
     struct progress bar;
     size_t n = 0;
     int last;
-    if (field_plan(&f, v, FIELD_MARGIN))
+    int st = field_plan(&f, v, &r->accuracy);
+    if (st == E_RANGE)
         die(EXIT_RUN, "%s: the field is too large for one convolution: leave --method field out", c->argv[0]);
+    check(st);
     check_memory(f.bytes, c->argv[0], c);
     if (!c->check)
         check(field_begin(&sum, &f, v));
@@ -420,10 +421,13 @@ static void draw_field(struct input *in, const struct view *v, const struct requ
             next_block(in, r, block);
     } while (!last);
     progress_end(&bar);
-    if (c->check)
-        return;
-    check(field_end(&sum, im));
-    report(sum.lost.bad, sum.lost.cut, c);
+    if (!c->check) {
+        check(field_end(&sum, im));
+        report(sum.lost.bad, sum.lost.cut, c);
+    }
+    if (c->verbose && !c->check)
+        fprintf(stderr, "simage: margin of %.0f\"; %zu parts reach farther: a stamp each\n", f.margin, sum.lost.large);
+    field_free(&f);
 }
 
 /* New pixels; the header stays. */

@@ -43,11 +43,15 @@ struct round {
 
 static int round_parts(struct round *r, const struct object *o)
 {
-    const double index = o->type == OBJECT_GAUSS ? 0.5 : o->n;
-    if (index == r->index)
-        return OK;
-    r->index = index;
-    r->n = sersic_gaussians(index, r->sigma, r->flux);
+    if (o->type == OBJECT_GAUSS) {
+        r->index = NAN;
+        r->n = 1;
+        r->sigma[0] = SIGMA_PER_RE;
+        r->flux[0] = 1;
+    } else if (o->n != r->index) {
+        r->index = o->n;
+        r->n = sersic_gaussians(o->n, r->sigma, r->flux);
+    }
     return r->n ? OK : E_RANGE;
 }
 

@@ -2,34 +2,65 @@
 #include "field.h"
 #include "fft.h"
 #include "render.h"
+#include "shapelet.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#define MARGIN 13.0            /* arcsec around the field, at least */
 #define ALIAS 21.0             /* aliases below exp(-21) = 8e-10 of what they are added to */
 #define CUT 28.0               /* the Gaussian ends at exp(-28) = 7e-13 */
 #define BLOCK 64               /* rows of frequencies tabulated at a time */
 
-int field_plan(struct field *f, const struct view *v, double margin)
+/* Where wings of a star are below the share of an object whose peak is a tenth of a star's; as far as they are known at most. */
+static double margin_for(const struct wings *w, const struct accuracy *a)
+{
+    const double limit = 0.1 * a->wing * a->eps * w->peak, last = (w->n - w->n / 8) * w->dr;
+    double r = fmin(MARGIN, last);
+    while (r + 1 < last && w->w[0][(int)(r / w->dr)] > limit)
+        r++;
+    return r;
+}
+
+static int choose_grid(struct field *f, const struct view *v)
+{
+    const double u = v->psf->ucut, fine = v->pixel / f->split, rate = 1 / fine, pad = 2 * f->margin / v->pixel;
+    const double nx = (double)v->nx + pad, ny = (double)v->ny + pad;
+    if (!(fmax(nx, ny) * 1.1 * f->split < 32768))
+        return E_RANGE;
+    f->nx = fft_good_size((int)ceil(nx));
+    f->ny = fft_good_size((int)ceil(ny));
+    f->x0 = (int)((f->nx - v->nx) / 2);
+    f->y0 = (int)((f->ny - v->ny) / 2);
+    f->sigma = sqrt(ALIAS / (2 * M_PI * M_PI * rate * (rate - 2 * u)));
+    f->cost = 25e-9 * f->split * f->split * f->nx * f->ny;
+    f->bytes = 17.0 * f->split * f->split * f->nx * f->ny + 16.0 * f->nx * f->ny;
+    return OK;
+}
+
+int field_plan(struct field *f, const struct view *v, const struct accuracy *a)
 {
     const double u = v->psf ? v->psf->ucut : 0;
-    if (!(u > 0) || !(v->pixel > 0) || !(margin >= 0) || v->nx < 1 || v->ny < 1)
+    if (!(u > 0) || !(v->pixel > 0) || v->nx < 1 || v->ny < 1)
         return E_RANGE;
-    struct field g = {.split = (int)ceil(3 * u * v->pixel), .margin = 0.5 * margin};    /* 1.5 times the Nyquist rate or more */
-    const double fine = v->pixel / g.split, rate = 1 / fine;
-    const double pad = margin / v->pixel;
-    const double nx = (double)v->nx + pad, ny = (double)v->ny + pad;
-    if (!(fmax(nx, ny) * 1.1 * g.split < 32768))
-        return E_RANGE;
-    g.nx = fft_good_size((int)ceil(nx));
-    g.ny = fft_good_size((int)ceil(ny));
-    g.x0 = (int)((g.nx - v->nx) / 2);
-    g.y0 = (int)((g.ny - v->ny) / 2);
-    g.sigma = sqrt(ALIAS / (2 * M_PI * M_PI * rate * (rate - 2 * u)));
-    g.cost = 25e-9 * g.split * g.split * g.nx * g.ny;
-    g.bytes = 17.0 * g.split * g.split * g.nx * g.ny + 16.0 * g.nx * g.ny;
-    *f = g;
-    return OK;
+    struct field g = {.split = (int)ceil(3 * u * v->pixel)};     /* 1.5 times the Nyquist rate or more */
+    const struct stamp_response response = view_response(v);
+    int st = wings_new(&g.wings, v->psf, &response, v->pixel, 4 * WINGS_WIDTH);
+    if (st == OK) {
+        g.margin = margin_for(&g.wings, a);
+        st = choose_grid(&g, v);
+    }
+    if (st)
+        field_free(&g);
+    else
+        *f = g;
+    return st;
+}
+
+void field_free(struct field *f)
+{
+    if (f->wings.w[0])
+        wings_free(&f->wings);
 }
 
 /* A transfer function of 1, that of a single sample, for objects that only the Gaussian blurs. */
@@ -60,7 +91,41 @@ static struct view fine_view(const struct field_sum *s, const struct otf *one)
     return w;
 }
 
-/* The objects, blurred, as samples times area to the fine grid; large[i] = 1 for those too large for it, which are left out. */
+/* Nothing, in the place of a part that is drawn elsewhere. */
+static struct emitter dark(const struct emitter *e)
+{
+    return (struct emitter){.parts = e->parts};
+}
+
+/* sum c^2 of an object, after dilation. */
+static double power_of(const struct emitter *e)
+{
+    double sum = 0;
+    for (size_t k = 0; k < shapelet_count(e->nmax); k++)
+        sum += e->coef[k] * e->coef[k];
+    return sum / (e->dilation * e->dilation);
+}
+
+/* Mark objects, with all their parts, whose wings fold back by more than their share of the tolerance. */
+static void mark_folding(const struct field_sum *s, const struct accuracy *a, size_t n, const struct emitter *e, unsigned char *large)
+{
+    const struct field *f = s->f;
+    const double side = sqrt((double)f->nx * f->ny);
+    size_t parts;
+    for (size_t i = 0; i < n; i += parts) {
+        double folded = 0, peak = 0;
+        parts = e[i].parts > 1 ? (size_t)e[i].parts : 1;
+        for (size_t k = i; k < i + parts && k < n; k++) {
+            const double power = e[k].coef ? power_of(&e[k]) : 0, flux = fabs(e[k].flux);
+            folded += flux * wings_folded(&f->wings, e[k].coef ? light_size(power) : 0, f->margin, side);
+            peak += flux * (e[k].coef ? light_peak(power, s->v->pixel, f->wings.peak) : f->wings.peak);
+        }
+        if (folded > a->wing * fmax(a->eps * peak, a->floor))
+            memset(large + i, 1, parts);
+    }
+}
+
+/* The objects, blurred, as samples times area to the fine grid; those that are, or become, large are left out. */
 static int blurred(struct field_sum *s, const struct accuracy *a, size_t n, const struct emitter *e, int threads, struct progress *bar,
                    unsigned char *large)
 {
@@ -75,7 +140,7 @@ static int blurred(struct field_sum *s, const struct accuracy *a, size_t n, cons
         return st;
     }
     for (size_t i = 0; i < n; i++) {
-        moved[i] = e[i];
+        moved[i] = large[i] ? dark(&e[i]) : e[i];
         moved[i].x = (e[i].x + f->x0) * f->split;
         moved[i].y = (e[i].y + f->y0) * f->split;
     }
@@ -215,14 +280,12 @@ static int draw_large(struct field_sum *s, const struct accuracy *a, size_t n, c
     size_t marked = 0;
     for (size_t i = 0; i < n; i++)
         marked += large[i];
+    s->lost.large += marked;
     struct emitter *own = marked ? malloc(n * sizeof *own) : NULL;
     if (!own)
         return marked ? E_NOMEM : OK;
-    for (size_t i = 0; i < n; i++) {
-        own[i] = e[i];
-        if (!large[i])
-            own[i].flux = 0;               /* parts of an object keep their places */
-    }
+    for (size_t i = 0; i < n; i++)
+        own[i] = large[i] ? e[i] : dark(&e[i]);
     int st = scene_plan(&p, s->v, a, n, own);
     if (st == OK)
         st = scene_render(&p, im, threads, NULL);
@@ -237,7 +300,11 @@ int field_add(struct field_sum *s, const struct accuracy *a, size_t n, const str
               struct progress *bar)
 {
     unsigned char *large = calloc(n + 1, 1);
-    int st = large ? blurred(s, a, n, e, threads, bar, large) : E_NOMEM;
+    int st = large ? OK : E_NOMEM;
+    if (st == OK) {
+        mark_folding(s, a, n, e, large);
+        st = blurred(s, a, n, e, threads, bar, large);
+    }
     if (st == OK)
         st = draw_large(s, a, n, e, large, im, threads);
     free(large);

@@ -4,8 +4,9 @@
  * output pixels' grid and transformed back.
  *
  * Wings of the PSF are those of the transfer function everywhere in the field; no stamp
- * ends and nothing but the field, padded by its margin, repeats.  Objects that reach farther than the
- * margin would be cut by the field's border: they are drawn by themselves, as in scene_plan.  The objects' frequencies
+ * ends and nothing but the field, padded by its margin, repeats.  The margin is as wide as the PSF's wings are above the request;
+ * objects that reach farther (too large, or so faint at their peak that the wings count) would fold back and are drawn by
+ * themselves, as in scene_plan.  The objects' frequencies
  * beyond the fine grid are held below 1e-9 by the Gaussian, which is divided out again.  Memory
  * 16 bytes per fine pixel, of which there are 1.5 to 3 per telescope's Nyquist interval and axis.
  */
@@ -17,6 +18,7 @@
 #include "image.h"
 #include "plan.h"
 #include "progress.h"
+#include "reach.h"
 
 struct field {
     int split;             /* fine pixels per output pixel and axis */
@@ -26,20 +28,23 @@ struct field {
     double margin;         /* arcsec, on each side */
     double bytes;
     double cost;           /* predicted CPU seconds without the objects: transforms of the fine pixels */
+    struct wings wings;
 };
 
-/* Choose the grid; margin in arcsec, half of it on each side. v needs a psf. E_RANGE: fine sides above 32768. */
-MUST_CHECK int field_plan(struct field *f, const struct view *v, double margin);
+/* Choose margin and grid. v needs a psf. E_RANGE: fine sides above 32768; E_NOMEM. */
+MUST_CHECK int field_plan(struct field *f, const struct view *v, const struct accuracy *a);
+void field_free(struct field *f);
 
 /* Objects that were not drawn as they should be. */
 struct field_losses {
     size_t bad;            /* not drawn: n_bad of the plan */
     size_t cut;            /* n_short of the plan */
+    size_t large;          /* no loss: drawn by themselves */
 };
 
 /*
- * The fine grid, to which objects are added as often as there are some.  Objects outside the margin are left out; those too
- * large for the grid go to im (of the view's size) at once, the others with field_end().
+ * The fine grid, to which objects are added as often as there are some.  Objects outside the margin are left out; those that
+ * reach beyond it go to im (of the view's size) at once, the others with field_end().
  * Error: eps of an object's peak or floor as with stamps, and
  * 2e-7 of the peak from float32. E_NOMEM, E_RANGE.
  */

@@ -129,10 +129,20 @@ static double star_peak(const struct wings *w, double x, double y)
     return centre * pow(w->peak / centre, 2 * (dx * dx + dy * dy));
 }
 
+double light_peak(double power, double pixel, double star)
+{
+    /* sum c^2 is the mean brightness weighted by light: half the peak of a Gaussian, less of cuspier ones */
+    return power > 0 ? 1 / (1 / (1.6 * pixel * pixel * power) + 1 / star) : 0;
+}
+
+double light_size(double power)
+{
+    return 0.9 / sqrt(4 * M_PI * power);   /* of a Gaussian of that power, and a margin */
+}
+
 static int light_of(struct maker *m, const struct emitter *s, const struct pose *q, struct light *l)
 {
     const struct plan *p = m->p;
-    const double theta2 = p->view.pixel * p->view.pixel;
     double star = p->view.psf ? star_peak(&p->wings, s->x, s->y) : 1;
     *l = (struct light){.beta = s->beta * s->dilation, .stretch = stretch_of(q->g), .peak = star};
     if (p->view.shear_order)
@@ -143,8 +153,7 @@ static int light_of(struct maker *m, const struct emitter *s, const struct pose 
             m->shells[n] /= s->dilation;
             l->power += m->shells[n] * m->shells[n];
         }
-        /* sum c^2 is the mean brightness weighted by light: half the peak of a Gaussian, less of cuspier ones */
-        l->peak = l->power > 0 ? 1 / (1 / (1.6 * theta2 * l->power) + 1 / star) : 0;
+        l->peak = light_peak(l->power, p->view.pixel, star);
     }
     l->tol = fmax(p->acc.eps * l->peak, p->acc.floor / fabs(s->flux));
     if (m->group_left > 0)
@@ -279,7 +288,7 @@ static struct need need_of(const struct maker *m, const struct emitter *s, const
         return (struct need){0, 0};
     const double core = p->wings.core / (l->beta * l->stretch);
     return (struct need){own_reach(m, s, l) * sqrt(1 + core * core) + (p->view.ipc > 0 ? p->view.pitch : 0),
-                         0.9 / sqrt(4 * M_PI * l->power)};   /* of a Gaussian of that power, and a margin */
+                         light_size(l->power)};
 }
 
 /* A period of n pixels repeats nothing that counts. */
@@ -620,7 +629,7 @@ static int make(struct maker *m)
     int st = envelope_new(&m->env, nmax);
     if (st == OK && p->view.psf) {
         const struct stamp_response r = view_response(&p->view);
-        st = wings_new(&p->wings, p->view.psf, &r, p->view.pixel);
+        st = wings_new(&p->wings, p->view.psf, &r, p->view.pixel, WINGS_WIDTH);
         p->fft_plans++;
     }
     for (size_t i = 0; i < p->n && st == OK; i++) {

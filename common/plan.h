@@ -109,6 +109,13 @@ struct plan {
     size_t fft_plans;                 /* FFT plans made: 0 without a PSF */
 };
 
+/*
+ * Estimates for a shapelet of unit flux with sum c^2 = power (1/arcsec^2): peak pixel, not too large, behind a PSF that leaves a star
+ * with a peak of `star`; rms size along an axis, arcsec, not too large either.
+ */
+double light_peak(double power, double pixel, double star);
+double light_size(double power);
+
 /* What the detector does to the light, of the view. */
 struct stamp_response view_response(const struct view *v);
 

@@ -191,14 +191,14 @@ static double star_peak(const struct wings *m, int n, int fine, const double *im
     return scale * fmax(image[(size_t)(n / 2 + d) * (size_t)n + (size_t)(n / 2 + d)], 1e-6 * m->w[0][0]);
 }
 
-int wings_new(struct wings *w, const struct otf *t, const struct stamp_response *r, double pixel)
+int wings_new(struct wings *w, const struct otf *t, const struct stamp_response *r, double pixel, double width)
 {
-    if (!(pixel > 0))
+    if (!(pixel > 0) || !(width >= WINGS_WIDTH))
         return E_RANGE;
     const int fine = pixel * t->ucut > 0.6 ? (int)ceil(pixel * t->ucut / 0.6) : 1;
     const double step = pixel / fine;
-    double side = 26 / step;
-    const int n = 4 * (side < 64 ? 16 : side > 1024 ? 256 : fft_good_size((int)(side / 4)));
+    const double side = width / step, most = width > WINGS_WIDTH ? 2048 : 1024;
+    const int n = 4 * (side < 64 ? 16 : side > most ? (int)most / 4 : fft_good_size((int)(side / 4)));
     struct stamp_grid g = {0};
     struct stamp_work *work = NULL;
     int st = stamp_grid_new(&g, t, r, step, n);

@@ -56,8 +56,9 @@ struct wings {
     double core;           /* Gaussian-equivalent sigma of the core, arcsec, pixel / sqrt(2 pi peak) */
 };
 
-/* Measure on an image of a star, about 26 arcsec wide. */
-MUST_CHECK int wings_new(struct wings *w, const struct otf *t, const struct stamp_response *r, double pixel);
+/* Measure on an image of a star `width` arcsec wide or, when pixels are small, as wide as 1024 samples are, 2048 above WINGS_WIDTH. */
+#define WINGS_WIDTH 26.0
+MUST_CHECK int wings_new(struct wings *w, const struct otf *t, const struct stamp_response *r, double pixel, double width);
 void wings_free(struct wings *w);
 
 /*

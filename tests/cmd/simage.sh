@@ -167,6 +167,14 @@ for x in 0.04 0.1 0.16; do
     ok "the field at once at $x" simage pair.txt -p soft.fits -x $x --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 --method field -o whole.fits
     near "largest difference at $x, of the peak" "$(NPIX=21000 diffmax stamps.fits whole.fits | awk -v p="$(stat stamps.fits 4)" '{ print $1 / p }')" 0 1.5e-6
 done
+# at 1e-7, where wings count: those that would fold back beyond the margin (3.8e-6 of the second one's peak beyond 13") make it wider or are stamps
+for type in "star 1 1" "gauss 2 1" "gauss 0.1 1" "sersic 0.3 2"; do
+    printf '# DX DY FLUX TYPE RE N\n0.31 0.17 1e5 %s\n' "$type" >wing.txt
+    simage wing.txt -p soft.fits -x 0.1 --size 80,81 --accuracy 1e-7 -o stamps.fits
+    simage wing.txt -p soft.fits -x 0.1 --size 80,81 --accuracy 1e-7 --method field -v -o whole.fits 2>v.txt
+    near "$type: stamps and field at 1e-7, of the peak" "$(NPIX=6400 diffmax stamps.fits whole.fits | awk -v p="$(stat stamps.fits 4)" '{ print $1 / p }')" 0 2e-7
+    grep -q "margin of .*; $(case $type in "gauss 2 1") echo 1 ;; "sersic 0.3 2") echo '[0-9]*' ;; *) echo 0 ;; esac) parts reach" v.txt && pass "told by -v" || fail "margin: $(grep margin v.txt)"
+done
 for o in "--no-pixel" "-N 2 --no-pixel" "--shear-order 4"; do
     ok "stamps $o" simage pair.txt -p soft.fits -x 0.1 --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 $o -o stamps.fits
     ok "field $o" simage pair.txt -p soft.fits -x 0.1 --size 150,140 --shear 0.02,0.05 --accuracy 1e-6 $o --method field -o whole.fits
