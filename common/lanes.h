@@ -22,7 +22,7 @@ MUST_CHECK int lanes_new(struct lanes **p, int n);
 MUST_CHECK int lanes_new_rows(struct lanes **p, int n, int rows);
 void lanes_free(struct lanes *p);
 
-/* Doubles of scratch that lanes_run needs. */
+/* Doubles of scratch that lanes_run needs, or twice as many floats for lanes_run_single. */
 size_t lanes_scratch(const struct lanes *p);
 
 /*
@@ -31,6 +31,9 @@ size_t lanes_scratch(const struct lanes *p);
  * zero and are not read.  Imaginary parts that symmetry makes 0 are ignored.  out: n x n (rows x n).
  */
 void lanes_run(const struct lanes *p, int m, double *re, double *im, int ld, double *scratch, double *out);
+
+/* The same in single precision, sixteen at a time: ld a multiple of 16, of plans from lanes_new. Errors of 1e-7 of the rms sum. */
+void lanes_run_single(const struct lanes *p, int m, float *re, float *im, int ld, float *scratch, float *out);
 
 /*
  * Its two passes in shares, which threads may do side by side: all columns before any row.  Transforms columns

@@ -376,10 +376,10 @@ int par_turn_wait(struct par_turns *t, int place, long item)
     return st;
 }
 
-void par_turn_end(struct par_turns *t, int place)
+void par_turn_give(struct par_turns *t, int place, long item)
 {
     pthread_mutex_lock(&t->lock);
-    t->turn[place]++;
+    t->turn[place] = item;
     pthread_cond_broadcast(&t->moved);
     pthread_mutex_unlock(&t->lock);
 }

@@ -48,7 +48,7 @@ struct par_turns *par_turns_new(int places, long items);         /* NULL: no mem
 long par_turn_take(struct par_turns *t);                         /* 0, 1, 2 ...; -1: no more, or a failure */
 int par_turn_ready(struct par_turns *t, int place, long item);   /* would it not wait? */
 MUST_CHECK int par_turn_wait(struct par_turns *t, int place, long item);    /* OK, or what par_turns_fail was told */
-void par_turn_end(struct par_turns *t, int place);
+void par_turn_give(struct par_turns *t, int place, long item);   /* its turn is now */
 void par_turns_fail(struct par_turns *t, int status);            /* nobody waits any longer */
 void par_turns_free(struct par_turns *t);
 

@@ -19,6 +19,8 @@
 #define BROAD_SIDE 256         /* larger pixels that a long period is counted in */
 #define BROAD_KMAX 16000       /* frequencies per axis of a large object */
 
+#define SINGLE_EPS 1e-5        /* of the peak: errors allowed from here on make room for those of single precision, 3e-7 */
+#define SINGLE_LEAST 1e-15     /* electrons: fainter and, inversely, brighter objects would leave its range */
 #define TABLE_BYTES 4194304.0  /* of all tables of transfer functions; classes of stamps beyond make their rows when drawn */
 #define PART_PIXELS 2097152    /* larger stamps are made in parts */
 #define LONGEST 10.0           /* seconds for one object without a stamp; those that need more are not drawn */
@@ -459,6 +461,8 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     double pixel = 0.55e-9 + 0.18e-9 * log2(d->nx);
     if (area > 6e5)                        /* beyond the caches */
         pixel *= 1.8;
+    if (plan_single(p, (size_t)(d - p->draw)))
+        return 1.5e-6 + matrix + 0.5 * rows + 1e-9 * orders * orders * k / 8 + 0.65 * area * pixel;
     return 1.5e-6 + matrix + rows * g->parts + 1e-9 * orders * orders * k / 8 + area * pixel;
 }
 
@@ -693,6 +697,14 @@ void plan_free(struct plan *p)
 size_t plan_scratch(const struct plan *p)
 {
     return shapelet_count(p->nmax);
+}
+
+int plan_single(const struct plan *p, size_t i)
+{
+    const struct draw *d = &p->draw[i];
+    const double flux = fabs(p->emitter[i].flux);           /* at least the peak */
+    return d->path == PATH_FOURIER && !d->mapped && p->grid[d->grid].parts == 1 && p->grid[d->grid].t_re
+           && flux > SINGLE_LEAST && flux < 1 / SINGLE_LEAST && (p->acc.eps >= SINGLE_EPS || p->acc.floor >= SINGLE_EPS * flux);
 }
 
 int plan_shape(const struct plan *p, size_t i, double *scratch, struct shape *s)

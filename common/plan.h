@@ -124,6 +124,9 @@ MUST_CHECK int scene_plan(struct plan *p, const struct view *v, const struct acc
                           const struct emitter *emitter);
 void plan_free(struct plan *p);
 
+/* Does the tolerance of object i, and how it is drawn, allow single precision (stamp_single)? */
+int plan_single(const struct plan *p, size_t i);
+
 /*
  * The shape to draw for object i: coefficients turned and sheared as planned.
  * scratch: 3 * plan_scratch(p) doubles, one per thread; s->coef points into it or to the emitter.

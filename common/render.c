@@ -15,19 +15,23 @@
 #define PART_PIXELS 131072     /* pixels, about, of one part of a stamp without a PSF */
 #define BROAD_PIXELS 1048576   /* and of an object larger than stamps: each part costs its frequencies again */
 #define PAGE_FLOATS 1024       /* in the smallest page of memory */
+#define BLOCK 32               /* rows of the image in which stamps begin that are drawn from left to right */
 #define STRIPS 8               /* of columns of the image, in each of which one thread adds */
 #define TALL 200               /* rows; taller stamps without a PSF, always few, are added to the image itself */
 
-/* Objects to draw: tall stamps first, then in order of their first row in the image, then of their number. */
+/*
+ * Objects to draw: tall stamps first, then blocks of rows, from left to right in each: what a stamp adds to is then still in the
+ * caches of who added the last one.
+ */
 struct entry {
-    int row;                       /* -1: tall */
-    int part;
+    int row;                       /* first of the block in which its own first row is; -1: tall */
+    int place;                     /* first column; of a tall one the part */
     unsigned int index;
 };
 
-/* Rows of a stamp that are made together. */
+/* Rows of a stamp that are made together, as doubles or floats. */
 struct piece {
-    int first, rows;
+    int first, rows, single;
 };
 
 static int part_rows(const struct draw *d)
@@ -46,18 +50,17 @@ static struct piece piece_of(const struct plan *p, const struct entry *e)
 {
     const struct draw *d = &p->draw[e->index];
     if (e->row >= 0)
-        return (struct piece){0, d->ny};
-    const int rows = part_rows(d), first = e->part * rows;
-    return (struct piece){first, d->ny - first < rows ? d->ny - first : rows};
+        return (struct piece){0, d->ny, plan_single(p, e->index)};
+    const int rows = part_rows(d), first = e->place * rows;
+    return (struct piece){first, d->ny - first < rows ? d->ny - first : rows, 0};
 }
 
-static int draw_piece(const struct plan *p, const struct entry *e, struct stamp_work *w, double *scratch, double *out)
+static int draw_piece(const struct plan *p, const struct entry *e, const struct piece *q, struct stamp_work *w, double *scratch, double *out)
 {
     const size_t i = e->index;
     const struct draw *d = &p->draw[i];
     const struct emitter *s = &p->emitter[i];
     const struct view *v = &p->view;
-    const struct piece q = piece_of(p, e);
     const double x = s->x - d->x0, y = s->y - d->y0, box = v->no_pixel ? 0 : v->pixel;
     struct shape shape;
     int st = plan_shape(p, i, scratch, &shape);
@@ -68,13 +71,15 @@ static int draw_piece(const struct plan *p, const struct entry *e, struct stamp_
         stamp_point(d->nx, d->ny, x, y, s->flux, out);
         return OK;
     case PATH_CLOSED:
-        return stamp_closed(w, &shape, v->pixel, box, d->nx, q.rows, x, y - q.first, s->flux, out);
+        return stamp_closed(w, &shape, v->pixel, box, d->nx, q->rows, x, y - q->first, s->flux, out);
     case PATH_MAPPED:
-        return stamp_mapped(w, &shape, v->pixel, box, d->nx, q.rows, x, y - q.first, s->flux, out);
+        return stamp_mapped(w, &shape, v->pixel, box, d->nx, q->rows, x, y - q->first, s->flux, out);
     case PATH_FOURIER:
+        if (q->single)
+            return stamp_single(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, (float *)out);
         return stamp_fourier(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, out);
     case PATH_BROAD:
-        return stamp_broad(&p->grid[d->grid], w, &shape, v->pixel, d->nx, q.rows, x, y - q.first, s->flux, d->kcut, out);
+        return stamp_broad(&p->grid[d->grid], w, &shape, v->pixel, d->nx, q->rows, x, y - q->first, s->flux, d->kcut, out);
     case PATH_NONE:
         break;
     }
@@ -105,7 +110,7 @@ int scene_stamp(const struct plan *p, size_t i, struct stamp_work *w, double *sc
     const struct draw *d = &p->draw[i];
     if (d->path == PATH_FOURIER && p->grid[d->grid].parts > 1)
         return stamp_of_parts(p, i, w, scratch, out);
-    return draw_piece(p, &(struct entry){0, 0, (unsigned int)i}, w, scratch, out);
+    return draw_piece(p, &(struct entry){0, 0, (unsigned int)i}, &(struct piece){0, d->ny, 0}, w, scratch, out);
 }
 
 static int by_row(const void *a, const void *b)
@@ -113,9 +118,11 @@ static int by_row(const void *a, const void *b)
     const struct entry *p = a, *q = b;
     if (p->row != q->row)
         return p->row < q->row ? -1 : 1;
+    if (p->row >= 0 && p->place != q->place)
+        return p->place < q->place ? -1 : 1;
     if (p->index != q->index)
         return p->index < q->index ? -1 : 1;
-    return p->part - q->part;
+    return p->place - q->place;
 }
 
 struct worker {
@@ -144,6 +151,12 @@ WIDE static void add_doubles(long n, const double *restrict from, double *restri
         to[i] += from[i];
 }
 
+WIDE static void add_singles(long n, const float *restrict from, double *restrict to)
+{
+    for (long i = 0; i < n; i++)
+        to[i] += (double)from[i];
+}
+
 WIDE static void add_floats(long n, const double *restrict from, float *restrict to)
 {
     for (long i = 0; i < n; i++)
@@ -167,42 +180,62 @@ static void window_move(struct window *w, int strip, long end)
     }
 }
 
+/* What the window still holds. */
+static int end_strips(void *ctx, long begin, long end, int worker)
+{
+    struct window *w = ctx;
+    (void)worker;
+    for (long strip = begin; strip < end; strip++)
+        window_move(w, (int)strip, w->im->ny);
+    return OK;
+}
+
 /* The part of a piece inside the strip: to the window, or to the image itself when it is tall. */
-static void strip_add(struct window *w, int strip, const struct draw *d, const struct piece *q, int tall, const double *stamp)
+static void strip_add(struct window *w, int strip, const struct draw *d, const struct piece *q, int row, const double *stamp)
 {
     const long nx = w->im->nx, left = strip_start(w, strip), right = strip_start(w, strip + 1);
     const long x0 = d->x0 < left ? left : d->x0, x1 = d->x0 + (long)d->nx > right ? right : d->x0 + (long)d->nx;
     if (x0 >= x1)
         return;
-    if (!tall)
-        window_move(w, strip, d->y0 < 0 ? 0 : d->y0);
+    if (row >= 0)
+        window_move(w, strip, row);
     for (int k = 0; k < q->rows; k++) {
         const long y = d->y0 + (long)q->first + k;
-        const double *from = stamp + (size_t)k * (size_t)d->nx + (x0 - d->x0);
+        const size_t from = (size_t)k * (size_t)d->nx + (size_t)(x0 - d->x0);
         if (y < 0 || y >= w->im->ny)
             continue;
-        if (tall)
-            add_floats(x1 - x0, from, w->im->pix + (size_t)y * (size_t)nx + x0);
+        if (row < 0)
+            add_floats(x1 - x0, stamp + from, w->im->pix + (size_t)y * (size_t)nx + x0);
+        else if (q->single)
+            add_singles(x1 - x0, (const float *)stamp + from, w->row + (size_t)(y % w->height) * (size_t)nx + x0);
         else
-            add_doubles(x1 - x0, from, w->row + (size_t)(y % w->height) * (size_t)nx + x0);
+            add_doubles(x1 - x0, stamp + from, w->row + (size_t)(y % w->height) * (size_t)nx + x0);
     }
 }
 
 static size_t doubles_of(const struct plan *p, const struct entry *e)
 {
     const struct piece q = piece_of(p, e);
-    return ((size_t)q.rows * (size_t)p->draw[e->index].nx + 7) / 8 * 8;
+    const size_t numbers = (size_t)q.rows * (size_t)p->draw[e->index].nx;
+    return ((q.single ? (numbers + 1) / 2 : numbers) + 7) / 8 * 8;
 }
 
+/* Entries that are drawn together, and the strips that they reach. */
+struct chunk {
+    unsigned int first, end;
+    unsigned char left, right;
+};
+
 /*
- * Entries in chunks: a thread draws a chunk and adds it to one strip after the other, to each in its turn.  The sums of
- * a strip are so formed in the order of the entries, whoever forms them.  Nobody waits for a turn who can draw
+ * A thread draws a chunk and adds it to one strip after the other, to each in its turn.  The sums of
+ * a strip are so formed in the order of the chunks, whoever forms them.  Nobody waits for a turn who can draw
  * one more chunk instead.
  */
 struct job {
     const struct plan *p;
     const struct entry *entry;
-    const size_t *first;           /* entry of each chunk, and one more: the end */
+    const struct chunk *chunk;
+    long chunks;
     struct window *w;
     struct worker *worker;
     int hold;                      /* chunks that each may hold, 1..HELD */
@@ -210,15 +243,25 @@ struct job {
     struct par_turns *turns;       /* of the chunks in each strip */
 };
 
+/* The first chunk from `from` on that reaches the strip. */
+static long next_in_strip(const struct job *j, int strip, long from)
+{
+    while (from < j->chunks && (strip < j->chunk[from].left || strip > j->chunk[from].right))
+        from++;
+    return from;
+}
+
 static int chunk_draw(const struct job *j, struct worker *w, long chunk)
 {
+    const struct chunk *c = &j->chunk[chunk];
     double *stamp = w->stamp[w->held];
     long drawn = 0;
-    for (const struct entry *e = j->entry + j->first[chunk]; e < j->entry + j->first[chunk + 1]; stamp += doubles_of(j->p, e++)) {
-        int st = draw_piece(j->p, e, w->work, w->scratch, stamp);
+    for (const struct entry *e = j->entry + c->first; e < j->entry + c->end; stamp += doubles_of(j->p, e++)) {
+        const struct piece q = piece_of(j->p, e);
+        int st = draw_piece(j->p, e, &q, w->work, w->scratch, stamp);
         if (st)
             return st;
-        drawn += e->part == 0;
+        drawn += e->row >= 0 || e->place == 0;
     }
     w->chunk[w->held++] = chunk;
     if (j->bar && drawn)
@@ -230,17 +273,18 @@ static int chunk_draw(const struct job *j, struct worker *w, long chunk)
 static int chunk_add(const struct job *j, struct worker *w)
 {
     const long chunk = w->chunk[0];
+    const struct chunk *c = &j->chunk[chunk];
     double *space = w->stamp[0];
-    for (int strip = 0; strip < STRIPS; strip++) {
+    for (int strip = c->left; strip <= c->right; strip++) {
         int st = par_turn_wait(j->turns, strip, chunk);
         if (st)
             return st;
         const double *stamp = space;
-        for (const struct entry *e = j->entry + j->first[chunk]; e < j->entry + j->first[chunk + 1]; stamp += doubles_of(j->p, e++)) {
+        for (const struct entry *e = j->entry + c->first; e < j->entry + c->end; stamp += doubles_of(j->p, e++)) {
             const struct piece q = piece_of(j->p, e);
-            strip_add(j->w, strip, &j->p->draw[e->index], &q, e->row < 0, stamp);
+            strip_add(j->w, strip, &j->p->draw[e->index], &q, e->row, stamp);
         }
-        par_turn_end(j->turns, strip);
+        par_turn_give(j->turns, strip, next_in_strip(j, strip, chunk + 1));
     }
     w->held--;
     for (int k = 0; k < w->held; k++) {
@@ -260,7 +304,7 @@ static int draw_and_add(void *ctx, long begin, long end, int worker)
     for (;;) {
         const long chunk = par_turn_take(j->turns);
         int st = chunk < 0 ? OK : chunk_draw(j, w, chunk);
-        while (st == OK && w->held && (chunk < 0 || w->held == j->hold || par_turn_ready(j->turns, STRIPS - 1, w->chunk[0])))
+        while (st == OK && w->held && (chunk < 0 || w->held == j->hold || par_turn_ready(j->turns, j->chunk[w->chunk[0]].right, w->chunk[0])))
             st = chunk_add(j, w);
         if (st)
             par_turns_fail(j->turns, st);
@@ -269,21 +313,93 @@ static int draw_and_add(void *ctx, long begin, long end, int worker)
     }
 }
 
-/* Cut n entries into chunks of at most CHUNK_PIXELS (or of one entry); first has room for n + 1. Returns their number. */
-static long cut_chunks(const struct plan *p, const struct entry *e, size_t n, size_t *first)
+/* Of so many halves of the image, from left to right, in which entry e begins. */
+static int half_of(const struct plan *p, const struct entry *e)
+{
+    return e->row >= 0 && e->place > p->view.nx / 2;
+}
+
+static int strip_of(long nx, long x)
+{
+    int strip = 0;
+    while (strip < STRIPS - 1 && x >= nx * (strip + 1) / STRIPS)
+        strip++;
+    return strip;
+}
+
+/* Cut n entries into chunks of at most CHUNK_PIXELS (or of one entry), each in one block and half. Returns their number; c may be NULL. */
+static long cut_chunks(const struct plan *p, const struct entry *e, size_t n, struct chunk *c)
 {
     long chunks = 0;
     size_t used = 0;
     for (size_t i = 0; i < n; i++) {
         const size_t need = doubles_of(p, &e[i]);
-        if (i == 0 || used + need > CHUNK_PIXELS) {
-            first[chunks++] = i;
+        if (i == 0 || used + need > CHUNK_PIXELS || e[i].row != e[i - 1].row || half_of(p, &e[i]) != half_of(p, &e[i - 1])) {
+            if (c)
+                c[chunks] = (struct chunk){(unsigned int)i, (unsigned int)i, STRIPS - 1, 0};
+            chunks++;
             used = 0;
         }
         used += need;
+        if (!c)
+            continue;
+        const struct draw *d = &p->draw[e[i].index];
+        const int left = strip_of(p->view.nx, d->x0), right = strip_of(p->view.nx, d->x0 + (long)d->nx - 1);
+        struct chunk *last = &c[chunks - 1];
+        last->end++;
+        last->left = left < last->left ? (unsigned char)left : last->left;
+        last->right = right > last->right ? (unsigned char)right : last->right;
     }
-    first[chunks] = n;
     return chunks;
+}
+
+/* The end of the block of rows that begins with chunk i. */
+static long block_end(const struct entry *e, long n, const struct chunk *c, long i)
+{
+    const int row = e[c[i].first].row;
+    while (i < n && e[c[i].first].row == row)
+        i++;
+    return i;
+}
+
+/* Chunks of the two halves of one block in turn, so that two threads seldom meet. */
+static void deal_block(const struct plan *p, const struct entry *e, long n, const struct chunk *from, struct chunk *to)
+{
+    long half = 0;
+    while (half < n && !half_of(p, &e[from[half].first]))
+        half++;
+    for (long a = 0, b = half; a < half || b < n;) {
+        if (a < half)
+            *to++ = from[a++];
+        if (b < n)
+            *to++ = from[b++];
+    }
+}
+
+/* All chunks, in the order in which they are drawn. NULL: no memory. */
+static struct chunk *make_chunks(const struct plan *p, const struct entry *e, size_t n, long *chunks)
+{
+    *chunks = cut_chunks(p, e, n, NULL);
+    struct chunk *c = malloc((size_t)*chunks * sizeof *c), *block;
+    if (!c)
+        return NULL;
+    (void)cut_chunks(p, e, n, c);
+    long most = 0;
+    for (long i = 0, end; i < *chunks; i = end) {
+        end = block_end(e, *chunks, c, i);
+        most = end - i > most ? end - i : most;
+    }
+    if (!(block = malloc((size_t)most * sizeof *block))) {
+        free(c);
+        return NULL;
+    }
+    for (long i = 0, end; i < *chunks; i = end) {
+        end = block_end(e, *chunks, c, i);
+        memcpy(block, c + i, (size_t)(end - i) * sizeof *block);
+        deal_block(p, e, end - i, block, c + i);
+    }
+    free(block);
+    return c;
 }
 
 /* Rows of the image come into memory, each by one thread: two that meet in a fresh page wait for the kernel, five times as long. */
@@ -354,7 +470,7 @@ static void order(const struct plan *p, struct entry *e, struct pass pass[PASSES
         const int tall = is_tall(p, d), parts = parts_of(d, tall);
         struct pass *q = &pass[!tall];
         for (int k = 0; k < parts; k++, n++) {
-            e[n] = (struct entry){tall ? -1 : d->y0 < 0 ? 0 : d->y0, k, (unsigned int)i};
+            e[n] = (struct entry){tall ? -1 : d->y0 < 0 ? 0 : d->y0 / BLOCK * BLOCK, tall ? k : d->x0, (unsigned int)i};
             const size_t need = doubles_of(p, &e[n]);
             q->largest = need > q->largest ? need : q->largest;
         }
@@ -375,11 +491,13 @@ static size_t entries(const struct plan *p)
 }
 
 /* All chunks of one pass on the threads. */
-static int run(struct job *j, long chunks, int threads, struct par_team *team)
+static int run(struct job *j, int threads, struct par_team *team)
 {
-    j->turns = par_turns_new(STRIPS, chunks);
+    j->turns = par_turns_new(STRIPS, j->chunks);
     if (!j->turns)
         return E_NOMEM;
+    for (int strip = 0; strip < STRIPS; strip++)
+        par_turn_give(j->turns, strip, next_in_strip(j, strip, 0));
     int st = par_team_for(team, threads, 1, draw_and_add, j);
     par_turns_free(j->turns);
     return st;
@@ -388,7 +506,7 @@ static int run(struct job *j, long chunks, int threads, struct par_team *team)
 /* The rows of a pass: its own, or those that stay, which hold the whole image and never move. */
 static int window_new(struct window *w, struct image *im, int tallest, double *sums)
 {
-    *w = (struct window){.im = im, .height = tallest > im->ny || sums ? (int)im->ny : tallest, .row = sums};
+    *w = (struct window){.im = im, .height = tallest > im->ny - BLOCK || sums ? (int)im->ny : tallest + BLOCK, .row = sums};
     for (int strip = 0; strip < STRIPS && sums; strip++)
         w->next[strip] = im->ny;
     if (tallest == 0 || sums)
@@ -415,19 +533,20 @@ static int render_pass(const struct plan *p, const struct pass *q, const struct 
         threads = most < 1 ? 1 : (int)most;
         hold = 1;
     }
-    size_t *first = malloc((q->n + 1) * sizeof *first);
+    long chunks;
+    struct chunk *chunk = make_chunks(p, e, q->n, &chunks);
     struct worker *workers = calloc((size_t)threads, sizeof *workers);
     int st = window_new(&w, im, q->tallest, sums);
     if (st == OK)
-        st = first && workers ? workers_new(workers, threads, plan_scratch(p), space, hold) : E_NOMEM;
+        st = chunk && workers ? workers_new(workers, threads, plan_scratch(p), space, hold) : E_NOMEM;
     if (st == OK) {
-        struct job job = {.p = p, .entry = e, .first = first, .w = &w, .worker = workers, .hold = hold, .bar = bar};
-        st = run(&job, cut_chunks(p, e, q->n, first), threads, team);
+        struct job job = {.p = p, .entry = e, .chunk = chunk, .chunks = chunks, .w = &w, .worker = workers, .hold = hold, .bar = bar};
+        st = run(&job, threads, team);
     }
-    for (int strip = 0; st == OK && w.row && strip < STRIPS; strip++)
-        window_move(&w, strip, im->ny);
+    if (st == OK && w.row)
+        st = par_team_for(team, STRIPS, 1, end_strips, &w);
     workers_free(workers, threads);
-    free(first);
+    free(chunk);
     if (!sums)
         free(w.row);
     return st;

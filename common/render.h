@@ -3,7 +3,7 @@
  *
  * Stamps are made in parallel, a few at a time, and added in one fixed order, in
  * double precision, to a window of rows that slides up the image: the same bytes
- * for any number of threads.
+ * for any number of threads.  Stamps themselves are made in single precision where the accuracy asked for allows it.
  */
 #ifndef PIXSHEAR_RENDER_H
 #define PIXSHEAR_RENDER_H
@@ -13,7 +13,7 @@
 #include "plan.h"
 #include "progress.h"
 
-#define RENDER_BYTES 20        /* that drawing takes for each emitter */
+#define RENDER_BYTES 24        /* that drawing takes for each emitter */
 
 /* Add to im (of the view's size, as image_new made it). bar may be NULL. */
 MUST_CHECK int scene_render(const struct plan *p, struct image *im, int threads, struct progress *bar);

@@ -11,6 +11,7 @@
 #include "shapelet.h"
 #include "shear.h"
 #include "simd.h"
+#include "single.h"
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -200,9 +201,10 @@ static int tabulate(struct stamp_grid *g, const struct otf *t, const double *u)
 {
     const int k = g->kmax, rows = 2 * k + 1;
     double *line = calloc((size_t)t->n + 8, sizeof *line);
-    g->t_re = calloc((size_t)rows * (size_t)g->ld, sizeof *g->t_re);
+    const size_t size = (size_t)rows * (size_t)g->ld + SINGLE_LANES;     /* blocks of so many may end beyond the last row */
+    g->t_re = calloc(size, sizeof *g->t_re);
     if (!otf_is_real(t))
-        g->t_im = calloc((size_t)rows * (size_t)g->ld, sizeof *g->t_im);
+        g->t_im = calloc(size, sizeof *g->t_im);
     int st = line && g->t_re && (g->t_im || otf_is_real(t)) ? OK : E_NOMEM;
     if (st == OK && !g->columns)
         st = rows_of_samples(g, t, u);
@@ -679,6 +681,54 @@ int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct
     if (st == OK)
         lanes_run(g->fft, f->columns, f->re, f->im, (int)width, w->lines.fft, out);
     return st;
+}
+
+/* What all rows share, in single precision. */
+static void take_single(const struct transform *t, struct single *q, int columns, float *mem)
+{
+    static const double one = 1;
+    const int point = !t->s->coef, orders = point ? 1 : t->nmax + 1;
+    const size_t from = (size_t)t->ld, ld = round8((size_t)columns);
+    single_begin(q, t->g->n, orders - 1, columns, mem);
+    const size_t to = (size_t)q->ld;
+    single_take(1, (int)ld, from, t->p_re, to, q->c);
+    single_take(1, (int)ld, from, t->p_im, to, q->s);
+    for (size_t k = 0; point && k < to; k++)
+        single_take(1, 1, 0, &one, 1, q->ve + k);
+    if (point) {
+        memset(q->vo, 0, to * sizeof *q->vo);
+        return;
+    }
+    single_take(orders, (int)ld, from, t->ve, to, q->ve);
+    single_take(orders, (int)ld, from, t->vo, to, q->vo);
+}
+
+int stamp_single(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux, double kcut,
+                 float *out)
+{
+    if (!drawable(s, x, y, flux, kcut) || g->parts != 1 || s->mapped || g->columns)
+        return E_RANGE;
+    const int top = kcut < g->kmax ? (int)kcut : g->kmax;
+    int st = start(g, w, s, x, y, flux, kcut, round8(single_floats(g->n, s->coef ? s->nmax : 0, top + 1)) / 2);
+    if (st)
+        return st;
+    const struct drawing *d = &w->d;
+    const struct transform *t = &d->t;
+    struct single q;
+    take_single(t, &q, top + 1, (float *)w->freq);
+    for (int ky = 0; ky <= top; ky++) {
+        const double reach = sqrt(kcut * kcut - (double)ky * ky), turn[2] = {d->scale * t->y_re[ky], d->scale * t->y_im[ky]};
+        const int m = 1 + (reach < g->kmax ? (int)reach : g->kmax);
+        struct single_transfer up, down;
+        float f[SHAPELET_NMAX + 1] = {1};
+        transfer_row(t, &w->lines, ky, m, 0, &up.re, &up.im);
+        transfer_row(t, &w->lines, -ky, m, 1, &down.re, &down.im);
+        for (int n2 = 0; n2 <= t->nmax; n2++)
+            f[n2] = (float)t->phi_y[(size_t)n2 * (size_t)t->ld + (size_t)ky];
+        single_row(&q, ky, m, f, turn, &up, &down);
+    }
+    lanes_run_single(g->fft, d->f.columns, q.re, q.im, q.width, (float *)w->lines.fft, out);
+    return OK;
 }
 
 int stamp_part_start(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,

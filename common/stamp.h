@@ -98,6 +98,13 @@ MUST_CHECK int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, c
                              double x, double y, double flux, double kcut, double *out);
 
 /*
+ * The same in single precision, for grids of one part with a table and shapes that are not mapped: 3e-7 of the peak, and
+ * |flux| such that float holds its squares.
+ */
+MUST_CHECK int stamp_single(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
+                            double kcut, float *out);
+
+/*
  * One part of it: rows part, part + parts, ... of the stamp, stamp_stride(n) doubles from one to the next, in
  * n / parts * stamp_stride(n) doubles, aligned to 64 bytes, that also serve for the frequencies.
  */

@@ -54,7 +54,7 @@ static int chained(void *ctx, long begin, long end, int worker)
                 if (st)
                     return st;
                 c->order[place][c->n[place]++] = held[0];
-                par_turn_end(c->turns, place);
+                par_turn_give(c->turns, place, held[0] + 1);
             }
             memmove(held, held + 1, (size_t)--n * sizeof *held);
         }

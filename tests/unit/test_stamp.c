@@ -452,6 +452,54 @@ static void truth(struct stamp_work *w)
     otf_free(&t);
 }
 
+/* Single precision against double, over the peak. */
+static void single(void)
+{
+    enum { MOST = 200 };
+    static const int side[] = {12, 16, 20, 24, 32, 40, 48, 64, 72, 80, 96, 120, 128, 144, 160, 180, MOST}, orders[] = {-1, 0, 1, 5, 12, 30, 60};
+    static double want[MOST * MOST];
+    static float got[MOST * MOST];
+    struct check c = check_begin("single precision: sides 12 to 200, orders 0 to 60 and a point, all or some frequencies: of the peak");
+    struct stamp_work *w = NULL;
+    int refused = 0;
+    if (!check_that(stamp_work_new(&w) == OK, "work"))
+        return;
+    for (int odd = 0; odd < 2; odd++)
+        for (size_t i = 0; i < sizeof side / sizeof *side; i++) {
+            const int n = side[i];
+            const size_t pixels = (size_t)n * (size_t)n;
+            struct stamp_response r = {.diffusion = 0.02, .box = 0.1, .ipc = odd ? 0.01 : 0, .pitch = 0.1};
+            struct stamp_grid g, cut;
+            struct otf t;
+            telescope(&t, odd);
+            if (stamp_grid_new(&g, &t, &r, 0.1, n) || stamp_grid_lean(&cut, &t, &r, 0.1, n, 2, 1))
+                exit(1);
+            for (size_t o = 0; o < sizeof orders / sizeof *orders; o++)
+                for (int some = 0; some < 3; some++) {
+                    const double beta = 0.1 * n / 30, kcut = some == 0 ? 1e9 : some == 1 ? 0.9 * n : 0.3 * n;
+                    struct shape s = {.nmax = orders[o] < 0 ? 0 : orders[o], .beta_x = beta * 1.1, .beta_y = beta / 1.1};
+                    double *coef = orders[o] < 0 ? NULL : galaxy(s.nmax, beta);
+                    s.coef = coef;
+                    if (stamp_fourier(&g, w, &s, 0.43 * n + 0.2, 0.52 * n - 0.3, 1e4, kcut, want) || stamp_single(&g, w, &s, 0.43 * n + 0.2, 0.52 * n - 0.3, 1e4, kcut, got))
+                        exit(1);
+                    const double peak = peak_of(pixels, want);
+                    for (size_t k = 0; k < pixels; k++)
+                        check_close(&c, (double)got[k] / peak, want[k] / peak, 3e-7);
+                    s.mapped = 1;
+                    refused += stamp_single(&g, w, &s, 1, 1, 1, 9, got) == E_RANGE;
+                    s.mapped = 0;
+                    refused += stamp_single(&cut, w, &s, 1, 1, 1, 9, got) == E_RANGE;
+                    free(coef);
+                }
+            stamp_grid_free(&g);
+            stamp_grid_free(&cut);
+            otf_free(&t);
+        }
+    stamp_work_free(w);
+    check_end(&c);
+    check_that(refused == 2 * 2 * 17 * 7 * 3, "single precision: mapped shapes and grids of parts are refused (%d)", refused);
+}
+
 int main(void)
 {
     struct stamp_work *w;
@@ -465,5 +513,6 @@ int main(void)
     lean(w);
     truth(w);
     stamp_work_free(w);
+    single();
     return check_status();
 }
