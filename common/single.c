@@ -31,13 +31,17 @@ void single_begin(struct single *q, int n, int nmax, int columns, float *mem)
     memset(q->re, 0, 2 * size[0] * sizeof *q->re);
 }
 
-WIDE void single_take(int rows, int columns, size_t from_ld, const double *restrict from, size_t ld, float *restrict to)
+WIDE static void take_row(size_t n, const double *restrict from, float *restrict to)
+{
+    for (size_t k = 0; k < n; k++)
+        to[k] = (float)from[k];
+}
+
+void single_take(int rows, int columns, size_t from_ld, const double *from, size_t ld, float *to)
 {
     for (int row = 0; row < rows; row++, from += from_ld, to += ld) {
-        for (int k = 0; k < columns; k++)
-            to[k] = (float)from[k];
-        for (size_t k = (size_t)columns; k < ld; k++)
-            to[k] = 0;
+        take_row((size_t)columns, from, to);
+        memset(to + columns, 0, (ld - (size_t)columns) * sizeof *to);
     }
 }
 

@@ -686,16 +686,15 @@ int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, const struct
 /* What all rows share, in single precision. */
 static void take_single(const struct transform *t, struct single *q, int columns, float *mem)
 {
-    static const double one = 1;
     const int point = !t->s->coef, orders = point ? 1 : t->nmax + 1;
     const size_t from = (size_t)t->ld, ld = round8((size_t)columns);
     single_begin(q, t->g->n, orders - 1, columns, mem);
     const size_t to = (size_t)q->ld;
     single_take(1, (int)ld, from, t->p_re, to, q->c);
     single_take(1, (int)ld, from, t->p_im, to, q->s);
-    for (size_t k = 0; point && k < to; k++)
-        single_take(1, 1, 0, &one, 1, q->ve + k);
     if (point) {
+        for (size_t k = 0; k < to; k++)
+            q->ve[k] = 1;
         memset(q->vo, 0, to * sizeof *q->vo);
         return;
     }
