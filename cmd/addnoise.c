@@ -47,6 +47,7 @@ struct work {
     const char *name;
     double psf_area;         /* arcsec^2, of --depth-definition point* */
     struct noise_counts counts;
+    double seconds;          /* of drawing alone */
 };
 
 /* Effective area of the PSF file's image, arcsec^2. */
@@ -184,8 +185,10 @@ static int expose(struct work *w, const struct plan *p, struct err *e)
         long here = x->ny - y < rows ? x->ny - y : rows;
         st = fits_in_rows(w->in, x->index, 0, y, here, pix, e);
         if (st == OK) {
+            const double begin = seconds_now();
             st = noise_add(&p->noise, w->c->seed, number, (uint64_t)y * (uint64_t)x->nx, here * x->nx,
                            w->c->threads, pix, &w->counts);
+            w->seconds += seconds_now() - begin;
             if (st)
                 err_set(e, st, "%s: %s", p->label, err_text(st));
         }
@@ -332,6 +335,8 @@ int main(int argc, char **argv)
         die(EXIT_RUN, "%s", e.text);
     char *record = opt_record(&prog, own, &c);
     run(&w, record);
+    if (c.verbose && !c.check)
+        fprintf(stderr, "addnoise: drawn in %.4f s\n", w.seconds);
     if (!c.quiet)
         report(&w.counts, w.name);
     free(record);

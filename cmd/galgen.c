@@ -259,8 +259,12 @@ static void make_galaxies(struct table *t, struct table *models, const struct pa
     if (!b.coef)
         check(E_NOMEM);
     progress_begin(&bar, "galaxies", p->n, c->quiet);
+    const double begin = seconds_now();
     check(par_for(p->n, CHUNK, c->threads, build_some, &b));
+    const double seconds = seconds_now() - begin;
     progress_end(&bar);
+    if (c->verbose)
+        fprintf(stderr, "galgen: coefficients made in %.4f s\n", seconds);
     copy_column(models, "RE", b.re, "arcsec", "Half-light radius before smoothing, circularised");
     copy_column(models, "Q", b.q, "", "Axis ratio of the disc");
     copy_column(models, "BT", b.bt, "", "Bulge to total flux");

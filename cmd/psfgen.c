@@ -4,6 +4,7 @@
  */
 #include "header.h"
 #include "opt.h"
+#include "progress.h"
 #include "psf.h"
 #include "psfio.h"
 #include "pupil.h"
@@ -20,6 +21,7 @@ struct psfgen {
     const char *zernike, *from;
     double diffusion, pixel, scale, cutoff, from_scale, x, y;
     int normalise, has_pixel, force;
+    double seconds;          /* of transform, convolution and image */
 };
 
 /* "J:WAVES,J:WAVES": into the pupil; a usage error names the piece. */
@@ -119,7 +121,7 @@ static double predict(const struct psfgen *g, int cells)
     return 4.6e-7 * (1 + 0.19 * further) * cells * cells + 1e-7 * (double)g->size * (double)g->size;
 }
 
-static int telescope_otf(const struct psfgen *g, const struct common *c, int asked, struct otf *t)
+static int telescope_otf(struct psfgen *g, const struct common *c, int asked, struct otf *t)
 {
     struct err e;
     int cells = choose_cells(g, asked, c->max_memory);
@@ -127,8 +129,10 @@ static int telescope_otf(const struct psfgen *g, const struct common *c, int ask
         warn("pupil: %d cells across %g m, %d wavelengths, %d aberrations, clear area %.4f m^2, about %.0f MB and %.2g s", cells, g->pupil.diameter,
              g->pupil.bandwidth > 0 ? g->pupil.wavelengths : 1, g->pupil.terms, pupil_area(&g->pupil, 256), pupil_memory(cells) * 1e-6,
              predict(g, cells));
+    const double begin = seconds_now();
     if (!c->check && pupil_otf(&g->pupil, cells, t, &e))
         die(EXIT_RUN, "%s", e.text);
+    g->seconds += seconds_now() - begin;
     return cells;
 }
 
@@ -226,7 +230,7 @@ static double width(const struct psfgen *g, const struct otf *t)
     return fwhm;
 }
 
-static void report(const struct otf *t, double fwhm, int n, const double *image)
+static void report(const struct psfgen *g, const struct otf *t, double fwhm, int n, const double *image)
 {
     const double r[] = {0.1, 0.2, 0.5, 1, 2};
     double inside[5], sum = 0, lowest = INFINITY;
@@ -234,6 +238,7 @@ static void report(const struct otf *t, double fwhm, int n, const double *image)
         sum += image[i];
         lowest = fmin(lowest, image[i]);
     }
+    fprintf(stderr, "psfgen: made in %.4f s\n", g->seconds);
     fprintf(stderr, "FWHM of the azimuthal mean %.5f arcsec; sum of the image %.6f, lowest sample %.3g\n", fwhm, sum, lowest);
     if (psf_encircled(t, 0, 0, 5, r, inside) == OK)
         fprintf(stderr, "flux within 0.1 0.2 0.5 1 2 arcsec: %.4f %.4f %.4f %.4f %.4f\n", inside[0], inside[1], inside[2], inside[3],
@@ -241,12 +246,13 @@ static void report(const struct otf *t, double fwhm, int n, const double *image)
 }
 
 /* Factors, width, image, file. */
-static void make(const struct psfgen *g, const struct common *c, struct otf *bare, int cells, const char *record)
+static void make(struct psfgen *g, const struct common *c, struct otf *bare, int cells, const char *record)
 {
     struct otf t = {0};
     struct header h = {0};
     struct err e;
     int n = (int)g->size;
+    const double begin = seconds_now();
     must(psf_table(bare, g->diffusion, g->pixel, &t));
     otf_free(bare);
     if (n * g->scale > psf_period(&t))
@@ -254,9 +260,10 @@ static void make(const struct psfgen *g, const struct common *c, struct otf *bar
             psf_period(&t));
     double fwhm = width(g, &t), *image = malloc((size_t)n * (size_t)n * sizeof *image);
     must(image ? psf_image(&t, 0, 0, n, n, g->scale, image) : E_NOMEM);
+    g->seconds += seconds_now() - begin;
     describe(g, &t, fwhm, cells, &h);
     if (c->verbose)
-        report(&t, fwhm, n, image);
+        report(g, &t, fwhm, n, image);
     if (psf_write(c->out, n, n, image, &t, &h, record, &g->from, g->from != NULL, &e))
         die(EXIT_RUN, "%s", e.text);
     free(image);

@@ -10,6 +10,13 @@ static long elapsed_ms(const struct progress *p)
     return (now.tv_sec - p->start.tv_sec) * 1000 + (now.tv_nsec - p->start.tv_nsec) / 1000000;
 }
 
+double seconds_now(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
 void progress_begin(struct progress *p, const char *what, long total, int quiet)
 {
     *p = (struct progress){.what = what, .total = total, .on = !quiet && total && isatty(STDERR_FILENO)};

@@ -25,4 +25,6 @@ void progress_tick(struct progress *p, long n);   /* n more items are done */
 void progress_part(struct progress *p, double part);
 void progress_end(struct progress *p);            /* wipe the bar */
 
+double seconds_now(void);                         /* of a clock that only moves forward */
+
 #endif

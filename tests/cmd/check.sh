@@ -28,3 +28,9 @@ plan fom im.use
 st=0; fits2png im.fits --check -o never.png >plan.out 2>plan.err || st=$?
 if [ $st -eq 0 ] && [ ! -s plan.out ] && grep -q '^fits2png: ' plan.err && [ ! -e never.png ]; then pass "fits2png --check"; else fail "fits2png --check: exit $st $(cat plan.out plan.err)"; fi
 near "every program is here" "$(find "$BIN" -type f | wc -l)" 11 0
+# -v tells the seconds of the kernel: some, and less than the whole run
+for p in "addnoise --depth 27.7 true.fits" "galgen -n 200 --models m2.txt" "psfgen --pupil-grid 256" "simage scene.txt --models m.txt -p psf.fits -x 0.1" "detect im.fits"; do
+    # shellcheck disable=SC2086
+    { TIMEFORMAT=%R; time $p -v -o told.fits 2>told.txt; } 2>whole.txt
+    between "$p: seconds of the kernel, in $(cat whole.txt) s" "$(sed -n 's/.* in \([0-9.]*\) s$/\1/p' told.txt | head -1)" 1e-4 "$(cat whole.txt)"
+done
