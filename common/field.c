@@ -117,8 +117,9 @@ static void mark_folding(const struct field_sum *s, const struct accuracy *a, si
         parts = e[i].parts > 1 ? (size_t)e[i].parts : 1;
         for (size_t k = i; k < i + parts && k < n; k++) {
             const double power = e[k].coef ? power_of(&e[k]) : 0, flux = fabs(e[k].flux);
-            folded += flux * wings_folded(&f->wings, e[k].coef ? light_size(power) : 0, f->margin, side);
-            peak += flux * (e[k].coef ? light_peak(power, s->v->pixel, f->wings.peak) : f->wings.peak);
+            const double size = e[k].coef ? light_size(power) : 0;
+            folded += flux * wings_folded(&f->wings, size, size, f->margin, side);
+            peak += flux * (e[k].coef ? light_peak(power, 1, s->v->pixel, f->wings.peak) : f->wings.peak);
         }
         if (folded > a->wing * fmax(a->eps * peak, a->floor))
             memset(large + i, 1, parts);

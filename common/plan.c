@@ -120,6 +120,8 @@ struct light {
     double beta;           /* after dilation */
     double power;          /* sum c^2 after dilation, 1/arcsec^2 */
     double stretch;        /* largest, of all shears */
+    double spread;         /* mean square radius weighted by brightness squared, arcsec^2 */
+    double mixed;          /* integral of |brightness| over |flux|, about; 1 unless the signs are mixed */
     double peak;           /* lower estimate of the peak pixel, fraction of the flux */
     double tol;            /* allowed error of a pixel over |flux| */
 };
@@ -131,10 +133,11 @@ static double star_peak(const struct wings *w, double x, double y)
     return centre * pow(w->peak / centre, 2 * (dx * dx + dy * dy));
 }
 
-double light_peak(double power, double pixel, double star)
+double light_peak(double power, double stretch, double pixel, double star)
 {
+    const double own = 1 / (1.6 * pixel * pixel * power), core = 1 / star, thin = stretch - 1 / stretch;
     /* sum c^2 is the mean brightness weighted by light: half the peak of a Gaussian, less of cuspier ones */
-    return power > 0 ? 1 / (1 / (1.6 * pixel * pixel * power) + 1 / star) : 0;
+    return power > 0 ? 1 / sqrt((own + core) * (own + core) + own * core * thin * thin) : 0;   /* of an ellipse after a disc */
 }
 
 double light_size(double power)
@@ -142,11 +145,29 @@ double light_size(double power)
     return 0.9 / sqrt(4 * M_PI * power);   /* of a Gaussian of that power, and a margin */
 }
 
+/*
+ * Light of both signs: when 4 pi power spread, 1 of a Gaussian and below 6 of galaxies, is large after the PSF's core (each shell
+ * smoothed as a disc in frequency that shells fill evenly on average), the peak is the rms of a patchwork of that extent and
+ * the wings are those of |brightness|.
+ */
+static void mixed_light(const struct maker *m, int nmax, double core, struct light *l)
+{
+    const double theta2 = m->p->view.pixel * m->p->view.pixel, s2 = core * core / (l->beta * l->beta);
+    double power = 0;
+    for (int n = 0; n <= nmax; n++) {
+        const double x = 2 * (n + 1) * s2;       /* (1 - e^-x) / x within 6 % */
+        power += m->shells[n] * m->shells[n] * (1 + x / 6) / (1 + x * (2 + x / 2) / 3);
+    }
+    const double mix = 4 * M_PI * power * (l->spread + core * core);
+    l->peak = fmin(l->peak, theta2 * power * fmin(2.6, 1.6 / sqrt(fmax(0.1, mix - 2))));
+    l->mixed = sqrt(fmax(1, mix - 3));
+}
+
 static int light_of(struct maker *m, const struct emitter *s, const struct pose *q, struct light *l)
 {
     const struct plan *p = m->p;
     double star = p->view.psf ? star_peak(&p->wings, s->x, s->y) : 1;
-    *l = (struct light){.beta = s->beta * s->dilation, .stretch = stretch_of(q->g), .peak = star};
+    *l = (struct light){.beta = s->beta * s->dilation, .stretch = stretch_of(q->g), .mixed = 1, .peak = star};
     if (p->view.shear_order)
         l->stretch *= stretch_of(hypot(p->view.g1, p->view.g2));
     if (s->coef) {
@@ -154,8 +175,13 @@ static int light_of(struct maker *m, const struct emitter *s, const struct pose 
         for (int n = 0; n <= s->nmax; n++) {
             m->shells[n] /= s->dilation;
             l->power += m->shells[n] * m->shells[n];
+            l->spread += (n + 1) * m->shells[n] * m->shells[n];
         }
-        l->peak = light_peak(l->power, p->view.pixel, star);
+        if (l->power > 0)
+            l->spread *= l->beta * l->beta / l->power;
+        l->peak = light_peak(l->power, l->stretch, p->view.pixel, star);
+        if (4 * M_PI * l->power * l->spread > 6)
+            mixed_light(m, s->nmax, p->view.psf ? p->view.pixel / sqrt(2 * M_PI * star) : 0, l);
     }
     l->tol = fmax(p->acc.eps * l->peak, p->acc.floor / fabs(s->flux));
     if (m->group_left > 0)
@@ -280,24 +306,31 @@ static int span(double origin, double reach, long n, int *first, int *count)
 
 /* With a PSF: what an object needs of its stamp. */
 struct need {
-    double own, size;      /* arcsec: beyond `own` there is none of its light; rms */
+    double own;            /* arcsec: beyond it there is none of the object's light */
+    double size, extent;   /* arcsec: of its finest structure, rms; of its light */
 };
 
 static struct need need_of(const struct maker *m, const struct emitter *s, const struct light *l)
 {
     const struct plan *p = m->p;
     if (!s->coef)
-        return (struct need){0, 0};
+        return (struct need){0};
     const double core = p->wings.core / (l->beta * l->stretch);
-    return (struct need){own_reach(m, s, l) * sqrt(1 + core * core) + (p->view.ipc > 0 ? p->view.pitch : 0),
-                         light_size(l->power)};
+    struct need q = {.own = own_reach(m, s, l) * sqrt(1 + core * core) + (p->view.ipc > 0 ? p->view.pitch : 0),
+                     .size = light_size(l->power)};
+    q.extent = q.size * l->stretch;
+    if (l->mixed > 1) {
+        q.extent = sqrt(2 * l->spread) * l->stretch;
+        q.size = fmin(q.size, l->beta * l->beta / (sqrt(2 * l->spread) * l->stretch));
+    }
+    return q;
 }
 
 /* A period of n pixels repeats nothing that counts. */
 static int period_good(const struct plan *p, const struct need *q, const struct light *l, double n)
 {
     const double half = (n / 2 - 1) * p->view.pixel;
-    return half >= q->own && wings_folded(&p->wings, q->size, half, n) <= p->acc.wing * l->tol;
+    return half >= q->own && l->mixed * wings_folded(&p->wings, q->size, q->extent, half, n) <= p->acc.wing * l->tol;
 }
 
 /* Bound of the object's transform at frequency u, times the integral of |T| beyond. */
@@ -305,7 +338,7 @@ static double band_beyond(const struct maker *m, const struct emitter *s, const 
 {
     double f = 1;
     if (s->coef)
-        f = fmin(10, 2 * M_PI * l->beta * envelope_value(&m->env, s->nmax, m->shells, 2 * M_PI * l->beta * u / l->stretch));
+        f = fmin(10 * l->mixed, 2 * M_PI * l->beta * envelope_value(&m->env, s->nmax, m->shells, 2 * M_PI * l->beta * u / l->stretch));
     return f * wings_tail(&m->p->wings, u);
 }
 

@@ -110,10 +110,10 @@ struct plan {
 };
 
 /*
- * Estimates for a shapelet of unit flux with sum c^2 = power (1/arcsec^2): peak pixel, not too large, behind a PSF that leaves a star
- * with a peak of `star`; rms size along an axis, arcsec, not too large either.
+ * Estimates for a shapelet of unit flux with sum c^2 = power (1/arcsec^2): peak pixel, not too large, stretched by a shear and
+ * behind a PSF that leaves a star with a peak of `star`; rms size along an axis, arcsec, not too large either.
  */
-double light_peak(double power, double pixel, double star);
+double light_peak(double power, double stretch, double pixel, double star);
 double light_size(double power);
 
 /* What the detector does to the light, of the view. */

@@ -238,14 +238,14 @@ void wings_free(struct wings *w)
     *w = (struct wings){0};
 }
 
-double wings_folded(const struct wings *w, double sigma, double half, double n)
+double wings_folded(const struct wings *w, double sigma, double extent, double half, double n)
 {
     /* nearer the border of the table its own replicas count: continue by the laws r^-3 and r^-1 */
     const int last = w->n - w->n / 8;
     int l = WINGS_LEVELS - 1;
     while (w->sigma[l] > sigma)
         l--;
-    const double near = half - (sigma - w->sigma[l]);
+    const double near = half - (extent - w->sigma[l]);
     const int i = near <= 0 ? 0 : near < last * w->dr ? (int)(near / w->dr) : last;
     const int k = half <= 0 ? 0 : half < last * w->dr ? (int)(half / w->dr) : last;
     const double far = near > last * w->dr ? near / (last * w->dr) : 1;

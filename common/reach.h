@@ -63,10 +63,11 @@ void wings_free(struct wings *w);
 
 /*
  * Error at the border of a periodic stamp of n x n pixels, `half` arcsec from centre to border, fraction of
- * the flux, for an object of rms size sigma (arcsec, along one axis): the nearest replica's
+ * the flux, for an object without structure finer than that of a Gaussian of rms sigma (arcsec), whose light
+ * reaches to `extent` (sigma for a Gaussian): the nearest replica's
  * wing and the mean of all replicas, the flux outside spread over the stamp.
  */
-double wings_folded(const struct wings *w, double sigma, double half, double n);
+double wings_folded(const struct wings *w, double sigma, double extent, double half, double n);
 
 /* pixel^2 times the integral of |T| beyond u. */
 double wings_tail(const struct wings *w, double u);
