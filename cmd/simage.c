@@ -490,7 +490,7 @@ static void run(const struct request *r, const struct common *c, const char *rec
     check(describe(&im.hdr, &in, r, &v));
     find_places(&in, r, &v, &im.hdr);
     header_free(&in.wcs);
-    check(emission_new(&block, BLOCK));
+    check(emission_new(&block, BLOCK, v.pixel, &r->accuracy));
     if (!c->check) {
         make_image(&im, &v, c);
         if (r->truth)

@@ -37,21 +37,21 @@ static void bend(struct emitter *to, const double map[4])
 /* Gaussians of a round object, of width 1 and flux 1. */
 struct round {
     int n;
-    double index;          /* of the Sersic profile that sigma and flux are of; NaN: none yet */
     double sigma[SERSIC_PARTS], flux[SERSIC_PARTS];
 };
 
-static int round_parts(struct round *r, const struct object *o)
+static int round_parts(struct emission *e, const struct object *o, double electrons, struct round *r)
 {
     if (o->type == OBJECT_GAUSS) {
-        r->index = NAN;
+        *r->sigma = SIGMA_PER_RE;
+        *r->flux = 1;
         r->n = 1;
-        r->sigma[0] = SIGMA_PER_RE;
-        r->flux[0] = 1;
-    } else if (o->n != r->index) {
-        r->index = o->n;
-        r->n = sersic_gaussians(o->n, r->sigma, r->flux);
+        return OK;
     }
+    int st = e->sersic ? OK : sersic_new(&e->sersic, e->eps);
+    if (st)
+        return st;
+    r->n = sersic_gaussians(e->sersic, o->n, e->pixel / (o->re * o->dilation), e->floor / fabs(electrons), r->sigma, r->flux);
     return r->n ? OK : E_RANGE;
 }
 
@@ -77,9 +77,10 @@ static void emit_round(struct emission *e, const struct object *o, struct emitte
     }
 }
 
-int emission_new(struct emission *e, size_t room)
+int emission_new(struct emission *e, size_t room, double pixel, const struct accuracy *a)
 {
-    struct emission made = {.room = room, .emitter = malloc((room + 1) * sizeof *made.emitter), .coef = malloc((room + 1) * sizeof(double))};
+    struct emission made = {.room = room, .pixel = pixel, .eps = a->eps, .floor = a->floor,
+                            .emitter = malloc((room + 1) * sizeof *made.emitter), .coef = malloc((room + 1) * sizeof(double))};
     if (!made.emitter || !made.coef) {
         emission_free(&made);
         return E_NOMEM;
@@ -91,14 +92,15 @@ int emission_new(struct emission *e, size_t room)
 int emission_add(struct emission *e, size_t *next, const struct scene *s, const struct models *m, const double *x,
                  const double *y, double (*map)[4], double exptime)
 {
-    struct round r = {.index = NAN};
+    struct round r;
     for (; *next < s->n; ++*next) {
         const struct object *o = &s->object[*next];
         const int is_round = o->type == OBJECT_GAUSS || o->type == OBJECT_SERSIC;
         struct emitter base = {.x = x[*next], .y = y[*next], .flux = o->flux * exptime, .parity = o->parity, .rotation = o->rot,
                                .dilation = o->dilation, .g1 = o->g1, .g2 = o->g2, .parts = 1};
-        if (is_round && round_parts(&r, o))
-            return E_RANGE;
+        int st = is_round ? round_parts(e, o, base.flux, &r) : OK;
+        if (st)
+            return st;
         if (e->n + (is_round ? (size_t)r.n : 1) > e->room)
             return OK;
         if (is_round) {
@@ -125,5 +127,6 @@ void emission_free(struct emission *e)
 {
     free(e->emitter);
     free(e->coef);
+    sersic_free(e->sersic);
     *e = (struct emission){0};
 }

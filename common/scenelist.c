@@ -61,5 +61,7 @@ int scene_list_next(struct scene_list *l, const struct scene_use *use, struct em
         st = emission_add(out, &l->given, &l->scene, use->models, l->x, l->y, use->place->maps ? l->map : NULL, use->exptime);
     } while (st == OK && l->given == l->scene.n && l->scene.n == ROWS);
     l->end = l->given == l->scene.n;
-    return st ? err_set(e, st, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", l->name) : OK;
+    if (st == E_RANGE)
+        return err_set(e, st, "%s: a Sersic index below 0.5: only 0.5 to 8 can be drawn", l->name);
+    return st ? err_set(e, st, "%s: %s", l->name, err_text(st)) : OK;
 }

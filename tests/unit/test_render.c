@@ -1,12 +1,11 @@
 /*
  * test_render.c - scenes: same bytes for any number of threads, paths that make no
- * transform, the series of the shear, Sersic profiles, and objects in strange places.
+ * transform, the series of the shear, and objects in strange places.
  * Error requested against error found: test_requests.c.
  */
 #include "check.h"
 #include "render.h"
 #include "scenes.h"
-#include "sersic.h"
 #include "shapelet.h"
 #include "shear.h"
 #include <stdlib.h>
@@ -49,45 +48,6 @@ static void field_free(struct emitter *s, int n)
     for (int i = 0; i < n; i++)
         free((double *)(uintptr_t)s[i].coef);
     free(s);
-}
-
-/* Light of a Sersic profile inside r (RE = 1), P(2n, b r^(1/n)), by its series. */
-static double sersic_inside(double n, double b, double r)
-{
-    const double x = b * pow(r, 1 / n), a = 2 * n;
-    if (x > 600)                           /* 1 - exp(-x) x^(a-1) ..., a <= 16 */
-        return 1;
-    double term = exp(-x + a * log(x) - lgamma(a + 1)), sum = term;
-    for (int k = 1; k < 2000; k++)
-        sum += term *= x / (a + k);
-    return sum;
-}
-
-static void sersic(void)
-{
-    static const double index[] = {0.5, 0.5025, 0.51, 0.6, 0.8, 1, 1.5, 2, 3, 4, 6, 8};
-    struct check k = check_begin("Sersic n = .5 to 8 as Gaussians: light inside 0.01 to 100 RE");
-    for (size_t i = 0; i < sizeof index / sizeof *index; i++) {
-        double sigma[SERSIC_PARTS], flux[SERSIC_PARTS], lo = 1e-3, hi = 20;
-        int parts = sersic_gaussians(index[i], sigma, flux);
-        for (int j = 0; j < 200; j++) {
-            double b = 0.5 * (lo + hi);
-            if (sersic_inside(index[i], b, 1) < 0.5)
-                lo = b;
-            else
-                hi = b;
-        }
-        for (double r = 0.01; r < 100; r *= 1.3) {
-            double sum = 0;
-            for (int j = 0; j < parts; j++)
-                sum += flux[j] * -expm1(-0.5 * r * r / (sigma[j] * sigma[j]));
-            check_close(&k, parts ? sum : NAN, sersic_inside(index[i], lo, r), index[i] < 0.52 ? 1e-3 : 1e-4);
-        }
-    }
-    check_end(&k);
-    double s[SERSIC_PARTS], f[SERSIC_PARTS];
-    check_that(!sersic_gaussians(0.49, s, f) && !sersic_gaussians(8.1, s, f) && !sersic_gaussians(NAN, s, f),
-               "other indices are refused");
 }
 
 enum { HALF = 30 };                /* of the largest order */
@@ -435,7 +395,6 @@ int main(void)
     series();
     strange(&t);
     undone(&t);
-    sersic();
     extremes(&t);
     otf_free(&t);
     return check_status();

@@ -345,7 +345,7 @@ static void requested(const struct request *q, const struct otf *t, const struct
         s.object[s.n++] = all->object[i];
     }
     size_t next = 0;
-    if (emission_new(&e, s.n * SERSIC_PARTS) || emission_add(&e, &next, &s, m, x, x + all->n, NULL, 2000)
+    if (emission_new(&e, s.n * SERSIC_PARTS, v.pixel, &a) || emission_add(&e, &next, &s, m, x, x + all->n, NULL, 2000)
         || scene_plan(&p, &v, &a, e.n, e.emitter) || stamp_work_new(&r.work))
         exit(1);
     r.scratch = malloc((3 * plan_scratch(&p) + 1) * sizeof *r.scratch);
