@@ -22,7 +22,7 @@ struct accuracy {
 };
 
 /* As measured: 1e-5 of the peak, no floor. */
-#define ACCURACY_DEFAULT {.eps = 1e-5, .floor = 0, .wing = 0.86, .edge = 0.4, .band = 0.5, .shear = 0.3, \
+#define ACCURACY_DEFAULT {.eps = 1e-5, .floor = 0, .wing = 0.88, .edge = 0.4, .band = 0.5, .shear = 0.3, \
                           .g_matrix = 0.2, .order_max = 60, .side_max = 2048}
 
 #endif
