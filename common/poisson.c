@@ -16,8 +16,9 @@
 #include "rng.h"
 #include "simd.h"
 #include <math.h>
+#include <string.h>
 
-enum { BLOCK = 256 };
+enum { BLOCK = 256, LANES = 8, STEPS = 4 };
 
 #define SERIES_LO 8.0       /* means for which the series is used */
 #define SERIES_HI 1e12
@@ -138,20 +139,64 @@ static double search(double guess, double u, double mean)
     return hi;
 }
 
-/* The exact draw where the series cannot say. */
+/* Eight doubles; the compiler splits them to what the processor has. */
+typedef double v8 __attribute__((vector_size(64)));
+typedef long long l8 __attribute__((vector_size(64)));
+
+/* Draws of small means, eight by eight: terms p (at first e^-mean) are added until the sum reaches u. n is a multiple of LANES. */
+WIDE static void sum_terms(int n, const double *u, const double *mean, const double *p, double *k)
+{
+    for (int i = 0; i < n; i += LANES) {
+        const v8 goal = *(const v8 *)(u + i), m = *(const v8 *)(mean + i), one = (v8){0} + 1;
+        v8 term = *(const v8 *)(p + i), sum = term, terms = {0};
+        for (double j = 1, more = 1; more > 0;) {
+            for (int step = 0; step < STEPS; step++, j++) {
+                terms += (v8)((l8)one & (l8)(sum < goal));
+                term *= m / j;
+                sum += term;
+            }
+            more = 0;
+            for (int lane = 0; lane < LANES; lane++)
+                more += sum[lane] < goal[lane];
+        }
+        *(v8 *)(k + i) = terms;
+    }
+}
+
+/* Is its draw made by sum_terms? */
+static int is_small(double u, double mean)
+{
+    return mean >= 0 && mean < SERIES_LO && u > 0 && u < 0.999;
+}
+
+/* Draws of the small means of a block, -1 for others. Returns their number. */
+static int inverse_small(int n, const double *u, const double *mean, double *k)
+{
+    __attribute__((aligned(64))) double goal[BLOCK], m[BLOCK], p[BLOCK], draw[BLOCK];
+    int at[BLOCK], found = 0;
+    for (int i = 0; i < n; i++) {
+        k[i] = -1;
+        if (is_small(u[i], mean[i])) {
+            goal[found] = u[i];
+            m[found] = mean[i];
+            p[found] = exp(-mean[i]);
+            at[found++] = i;
+        }
+    }
+    int end = found;
+    for (; end % LANES; end++)
+        goal[end] = m[end] = p[end] = 0;
+    sum_terms(end, goal, m, p, draw);
+    for (int i = 0; i < found; i++)
+        k[at[i]] = draw[i];
+    return found;
+}
+
+/* The exact draw where the series cannot say, of other means. */
 static double inverse_slow(double u, double mean)
 {
     if (!(mean >= 0 && mean <= POISSON_MAX_MEAN && u > 0 && u < 1))
         return NAN;
-    if (mean < SERIES_LO && u < 0.999) {
-        double p = exp(-mean), sum = p, k = 0;
-        while (sum < u) {
-            k++;
-            p *= mean / k;
-            sum += p;
-        }
-        return k;
-    }
     if (!(mean > 0))
         return 0;
     const double w = rng_normal_inverse(u), root = sqrt(mean);
@@ -219,7 +264,11 @@ WIDE static void series(int n, const double *restrict w, const double *restrict 
 
 static void inverse_block(int n, const double *u, const double *mean, double *k)
 {
-    double w[BLOCK], root[BLOCK], guess[BLOCK], sure[BLOCK], reach[BLOCK];
+    double w[BLOCK], root[BLOCK], guess[BLOCK], sure[BLOCK], reach[BLOCK], small[BLOCK];
+    if (inverse_small(n, u, mean, small) == n) {
+        memcpy(k, small, (size_t)n * sizeof *k);
+        return;
+    }
     scores(n, u, w);
     for (int i = 0; i < n; i++) {
         root[i] = sqrt(mean[i]);         /* here: a call that may set errno stops vectorisation */
@@ -231,7 +280,7 @@ static void inverse_block(int n, const double *u, const double *mean, double *k)
         if (sure[i] > 0 && reach[i] <= SERIES_S * SERIES_S && mean[i] >= SERIES_LO && mean[i] <= SERIES_HI)
             k[i] = guess[i];
         else
-            k[i] = inverse_slow(u[i], mean[i]);
+            k[i] = small[i] < 0 ? inverse_slow(u[i], mean[i]) : small[i];
     }
 }
 

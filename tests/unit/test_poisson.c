@@ -236,9 +236,34 @@ static void coupling(void)
     }
 }
 
+/* Runs of means small, large and mixed, and of none, in place: as one by one. */
+static void runs(void)
+{
+    enum { N = 5000 };
+    static double u[N], k[N];
+    const struct rng r = rng_stream(12, 0, RNG_TEST);
+    const double lo[] = {1e-3, 1e-3, 4, 20}, hi[] = {7.9, 1e3, 16, 900};
+    size_t wrong = 0;
+    for (int kind = 0; kind < 4; kind++) {
+        double *v = k;
+        double mean[N];
+        for (int i = 0; i < N; i++) {
+            u[i] = i % 997 == 5 ? 1 - 1e-6 : i % 991 == 7 ? 0.9990000001 : i % 1009 == 9 ? NAN : rng_uniform(&r, (uint64_t)(N * kind + i), 0);
+            mean[i] = v[i] = i % 883 == 3 ? 0 : i % 887 == 4 ? -1 : exp(log(lo[kind]) + rng_uniform(&r, (uint64_t)(N * kind + i), 1) * log(hi[kind] / lo[kind]));
+        }
+        poisson_inverse_run(N, u, v, v);
+        for (int i = 0; i < N; i++) {
+            const double one = poisson_inverse(u[i], mean[i]);
+            wrong += !(v[i] == one || (isnan(v[i]) && isnan(one)));
+        }
+    }
+    check_that(wrong == 0, "20000 draws in runs, small, large and mixed means, in place: as one by one (%zu differ)", wrong);
+}
+
 int main(void)
 {
     const char *large = getenv("POISSON_DRAWS");
+    runs();
     exact_values();
     definition();
     at_steps();
