@@ -475,11 +475,17 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     double area = (double)d->nx * d->ny, orders = s->coef ? s->nmax + 1 : 0;
     if (d->matrix >= 0)
         orders = p->matrix[d->matrix].nout + 1;
+    else if (d->grown)
+        orders = d->grown + 1;
     double matrix = d->matrix >= 0 ? 0.2e-9 * (double)shapelet_count(s->nmax) * orders * orders : 0;
+    if (d->grown)                          /* turned, squeezed and turned back */
+        matrix += 0.55e-9 * orders * orders * orders;
     if (d->path == PATH_CLOSED)
         return 1e-6 + matrix + 0.17e-9 * orders * area + 7e-9 * orders * (d->nx + d->ny);
     if (d->path == PATH_MAPPED) {
         struct pose q;
+        if (s->nmax == 0)
+            return 50e-6 + 3.3e-6 * (d->nx + d->ny) + 35e-9 * area;
         return pose_of(&p->view, s, &q) ? 0 : mapped_cost(s, mapped_nodes(s, stretch_of(q.g)));
     }
     if (d->path == PATH_BROAD)

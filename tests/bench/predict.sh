@@ -20,6 +20,13 @@ for x in 0.16 0.10 0.04; do
     against "simage $x\", shear of order 4" $scene --shear-order 4 -p psf.fits --accuracy 1e-4
 done
 against "simage 0.04\", one convolution" $scene -p psf.fits --accuracy 1e-4 --method field
+for q in 0.9 0.6 0.3 0.1; do
+    awk -v q=$q 'BEGIN { srand(1); print "# DX DY FLUX TYPE RE Q PA"; for (i = 0; i < 3000; i++) print 160 * rand() - 80, 160 * rand() - 80, 1000, "gauss", 0.3, q, 180 * rand() }' >gauss.txt
+    against "simage 0.10\", 3000 Gaussians, axis ratio $q, no PSF" simage gauss.txt -x 0.1 --size 1638,1638 -o round.fits
+done
+awk 'BEGIN { srand(1); print "# DX DY FLUX TYPE RE N Q PA"; for (i = 0; i < 600; i++) print 160 * rand() - 80, 160 * rand() - 80, 100, "sersic", 0.05 + 0.3 * rand(), 0.5 + 5.5 * rand(), 0.2 + 0.8 * rand(), 180 * rand() }' >sersic.txt
+against "simage 0.10\", 600 Sersic profiles, no PSF" simage sersic.txt -x 0.1 --size 1638,1638 -o round.fits
+against "simage 0.10\", 600 Sersic profiles, 1e-4" simage sersic.txt -x 0.1 --size 1638,1638 -p psf.fits --accuracy 1e-4 -o round.fits
 for rate in 0.1 5 50 5000; do against "addnoise, sky $rate electron/s/arcsec^2" addnoise image.fits --sky-rate $rate -o noisy.fits; done
 against "dither, 2 x 2" dither -n 2 noisy.fits -o four.fits
 for kernel in square point turbo gaussian lanczos2 lanczos3; do
