@@ -93,7 +93,7 @@ static void extremes(const struct otf *t)
         const struct view v = {.nx = side, .ny = side, .pixel = 0.1, .psf = i % 2 ? t : NULL, .g1 = g[0], .g2 = g[1]};
         struct image im = render(&v, i % 2 ? 1e-4 : 1e-9, 1, &s, 1, NULL);
         const double sum = sum_of(&im) / 1000, want = held ? m[0] : inside(b, n / 2, 0.3, g, side, 0.1);
-        check_close(&k, sum / want, 1, 6e-8);
+        check_close(&k, sum / want, 1, i % 2 ? 3e-7 : 6e-8);   /* at 1e-4 stamps are made in single precision */
         whole += held;
         part += !held;
         image_free(&im);
