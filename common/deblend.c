@@ -673,7 +673,8 @@ static int measure_parts(const struct segments *s, size_t c, const struct deblen
                 share_moments(w, first, &w->pixel[i], out->blob + base, parts);
             else
                 add_moments(b, x, s->run[r].y, (double)s->smooth[at]);
-            owner[at] = (int32_t)base + w->pixel[i].set;
+            const int32_t number = (int32_t)base + w->pixel[i].set;
+            memcpy(&owner[at], &number, sizeof number);        /* where the pixel's value was, perhaps */
         }
     out->n = base + parts;
     return find_margins(w, out, base, p->min_area);

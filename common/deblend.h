@@ -60,7 +60,8 @@ void deblend_work_free(struct deblend_work *w);
 
 /*
  * Split component c of s; append its objects to `out`.  When they are several,
- * write for each of its pixels owner[at] = index in `out`.
+ * write for each of its pixels owner[at] = index in `out`; this may be the memory
+ * of s->smooth, whose values of the component are then gone.
  */
 MUST_CHECK int deblend_component(const struct segments *s, size_t c, const struct deblend_params *p,
                                  struct deblend_work *w, int32_t *owner, struct blob_list *out);

@@ -3,6 +3,7 @@
 #include "clean.h"
 #include "deblend.h"
 #include "grow.h"
+#include "pages.h"
 #include "progress.h"
 #include "segment.h"
 #include "simd.h"
@@ -13,6 +14,7 @@
 
 enum { BRANCH = 3 };            /* least pixels of a deblended branch */
 enum { COMPONENTS = 16, OBJECTS = 8 };      /* per task */
+enum { RETURN = 1 << 25 };      /* bytes of objects that go back at a time */
 
 void detect_weights(float *map, size_t n, enum weight_type type)
 {
@@ -144,6 +146,7 @@ struct split {
     int32_t *whole;            /* per component: the object inside the task's list, -1: split */
     struct blob_list *list;    /* one per task */
     struct deblend_work **work;    /* one per worker, made by itself */
+    uint16_t *top;             /* per component: its first row */
 };
 
 static int split_components(void *ctx, long begin, long end, int worker)
@@ -173,13 +176,45 @@ static int join_lists(struct blob_list *all, struct blob_list *list, long n, siz
     int st = grow(&all->blob, &all->cap, total + 1, sizeof *all->blob);
     if (st)
         return st;
+    size_t freed = 0;
     for (long i = 0; i < n; i++) {         /* a list goes as its objects come */
         if (list[i].n)
             memcpy(all->blob + base[i], list[i].blob, list[i].n * sizeof *all->blob);
         free(list[i].blob);
+        freed += list[i].cap * sizeof *all->blob;
         list[i] = (struct blob_list){0};
+        if (freed > RETURN) {
+            pages_return();
+            freed = 0;
+        }
     }
     all->n = total;
+    return OK;
+}
+
+/* A run without its row: the columns of the first of a row after another one change places. */
+struct span {
+    uint16_t a, b;
+};
+
+/* The runs of components become spans, in place and in 2/3 of the memory: a component has runs in each row from its first on. */
+static int pack_runs(struct segments *s, uint16_t **top)
+{
+    *top = malloc((s->ncomponent + 1) * sizeof **top);
+    if (!*top)
+        return E_NOMEM;
+    char *to = (char *)s->run;
+    for (size_t c = 0; c < s->ncomponent; c++) {
+        uint16_t y = (*top)[c] = s->run[s->first[c]].y;
+        for (size_t i = s->first[c]; i < s->first[c + 1]; i++) {
+            const struct run r = s->run[i];
+            const struct span span = r.y == y ? (struct span){r.x0, r.x1} : (struct span){r.x1, r.x0};
+            memcpy(to + i * sizeof span, &span, sizeof span);
+            y = r.y;
+        }
+    }
+    struct run *less = realloc(s->run, s->nrun * sizeof(struct span) + 1);
+    s->run = less ? less : s->run;
     return OK;
 }
 
@@ -190,16 +225,25 @@ static void label_runs(const struct split *t, const size_t *base, const int32_t 
     for (size_t c = 0; c < s->ncomponent; c++) {
         const int32_t *mine = t->owner + s->at[c], *of = number ? number + base[c / COMPONENTS] : NULL;
         const int32_t whole = t->whole[c];
-        for (const struct run *r = s->run + s->first[c], *stop = s->run + s->first[c + 1]; r < stop; mine += r->x1 - r->x0, r++)
-            for (int32_t x = r->x0, end; x < r->x1; x = end) {
-                int32_t k = whole >= 0 ? whole : mine[x - r->x0];
-                for (end = whole >= 0 ? r->x1 : x + 1; end < r->x1 && mine[end - r->x0] == k;)
+        long y = t->top[c];
+        for (size_t i = s->first[c]; i < s->first[c + 1]; i++) {
+            struct span r;
+            memcpy(&r, (const char *)s->run + i * sizeof r, sizeof r);
+            if (r.a > r.b) {
+                r = (struct span){r.b, r.a};
+                y++;
+            }
+            for (int32_t x = r.a, end; x < r.b; x = end) {
+                int32_t k = whole >= 0 ? whole : mine[x - r.a];
+                for (end = whole >= 0 ? r.b : x + 1; end < r.b && mine[end - r.a] == k;)
                     end++;
                 if (of)
-                    labels_put(l, r->y, x, end, of[k]);
+                    labels_put(l, y, x, end, of[k]);
                 else
-                    labels_count(l, r->y);
+                    labels_count(l, y);
             }
+            mine += r.b - r.a;
+        }
     }
 }
 
@@ -253,7 +297,7 @@ static int settle(const struct pixels *im, const struct detect_params *p, struct
 
 /* Segments to blobs and labels. */
 static int separate(const struct pixels *im, const float *map, const struct detect_params *p, struct par_team *team,
-                    const struct segments *s, struct blob_list *all, struct detection *d)
+                    struct segments *s, struct blob_list *all, struct detection *d)
 {
     long tasks = (long)((s->ncomponent + COMPONENTS - 1) / COMPONENTS);
     struct deblend_params dp = {
@@ -262,11 +306,12 @@ static int separate(const struct pixels *im, const float *map, const struct dete
         .threshold = map ? d->threshold : d->threshold * d->noise, .nx = im->nx,
         .most = DETECT_MOST + pixels_count(im) / DETECT_PART
     };
-    struct split split = {s, &dp, malloc((s->npix + 1) * sizeof(int32_t)), malloc((s->ncomponent + 1) * sizeof(int32_t)),
+    /* the object of a pixel takes the place of its filtered value, which nobody asks for again */
+    struct split split = {s, &dp, (int32_t *)(void *)s->smooth, malloc((s->ncomponent + 1) * sizeof(int32_t)),
                           calloc((size_t)tasks + 1, sizeof(struct blob_list)),
-                          calloc((size_t)par_team_size(team), sizeof(struct deblend_work *))};
+                          calloc((size_t)par_team_size(team), sizeof(struct deblend_work *)), NULL};
     size_t *base = malloc(((size_t)tasks + 1) * sizeof *base);
-    int st = split.owner && split.whole && split.list && split.work && base ? OK : E_NOMEM;
+    int st = split.whole && split.list && split.work && base ? OK : E_NOMEM;
     if (!st)
         st = par_team_for(team, (long)s->ncomponent, COMPONENTS, split_components, &split);
     for (int i = 0; i < par_team_size(team) && split.work; i++)
@@ -277,10 +322,14 @@ static int separate(const struct pixels *im, const float *map, const struct dete
     for (long i = 0; i < tasks && split.list; i++)
         free(split.list[i].blob);
     free(split.list);
+    free(s->value);                        /* all sums are made: room for the labels */
+    s->value = NULL;
+    if (!st)
+        st = pack_runs(s, &split.top);
     if (!st)
         st = settle(im, p, team, &split, base, all, d);
-    free(split.owner);
     free(split.whole);
+    free(split.top);
     free(base);
     return st;
 }

@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STRIP = TILES_TALL, BLOCK = 64, RETURN = 1 << 19 };
+enum { STRIP = TILES_TALL, BLOCK = 64, TOGETHER = 1 << 18, RETURN = 1 << 19 };
 
 /* ---- filtered rows in order ---- */
 
@@ -198,21 +198,21 @@ int segment_filtered(const struct pixels *im, const struct background *b, const 
 /* ---- runs of one strip ---- */
 
 struct stretch {
-    uint16_t y, x0, x1;
-    uint16_t good;         /* pixels that are not bad */
+    uint16_t x0, x1;
 };
 
-/* Runs in reading order with their pixels. */
+/* Runs of a strip in reading order with their pixels. */
 struct stretches {
-    size_t nrun, cap_run, npix, cap_pair;
+    size_t nrun, cap_run, cap_good, npix, cap_pair;
     struct stretch *run;
+    uint16_t *good;        /* of every run the pixels that are not bad; NULL: all are good */
     float *pair;           /* of every pixel its filtered and its unfiltered value */
+    uint32_t row[STRIP + 1];       /* the first run of each row */
 };
 
 struct strip {
     struct stretches s;
-    uint32_t *parent;      /* of every run: the first one of its component inside the strip */
-    const uint32_t *place; /* of every run that stays the place of its pixels among those of the image, else NOWHERE; not owned */
+    uint32_t *place;       /* of every run that stays the place of its pixels among those of the image, else NOWHERE */
 };
 
 static const uint32_t NOWHERE = UINT32_MAX;
@@ -239,8 +239,9 @@ struct scratch {
 static void strip_free(struct strip *s)
 {
     free(s->s.run);
+    free(s->s.good);
     free(s->s.pair);
-    free(s->parent);
+    free(s->place);
     *s = (struct strip){0};
 }
 
@@ -276,13 +277,17 @@ static int add_run(struct stretches *s, const struct scanned *row, long x0, long
 {
     size_t n = (size_t)(x1 - x0), good = n;
     int st = grow(&s->run, &s->cap_run, s->nrun + 1, sizeof *s->run);
+    if (!st && row->kind)
+        st = grow(&s->good, &s->cap_good, s->nrun + 1, sizeof *s->good);
     if (!st)
         st = grow(&s->pair, &s->cap_pair, 2 * (s->npix + n), sizeof *s->pair);
     if (st)
         return st;
     for (long x = x0; row->kind && x < x1; x++)
         good -= row->kind[x] != PIXEL_GOOD;
-    s->run[s->nrun++] = (struct stretch){(uint16_t)row->y, (uint16_t)x0, (uint16_t)x1, (uint16_t)good};
+    if (row->kind)
+        s->good[s->nrun] = (uint16_t)good;
+    s->run[s->nrun++] = (struct stretch){(uint16_t)x0, (uint16_t)x1};
     float *to = s->pair + 2 * s->npix;
     const float *smooth = row->smooth + x0, *plain = row->plain + x0;
     for (size_t i = 0; i < n; i++) {
@@ -327,6 +332,7 @@ struct rows {
 static int scan_row(struct stretches *s, const struct scanned *row, long nx, struct rows r)
 {
     long start = -1;
+    s->row[row->y % STRIP] = (uint32_t)s->nrun;
     for (long x = 0, k = 1; x < nx; x += BLOCK, k++) {
         uint64_t bits = r.here[k];
         if (bits && !r.alone)
@@ -386,21 +392,24 @@ static void join_rows(struct row up, struct row here, uint32_t *parent)
     }
 }
 
+/* The runs of a row of a strip, 0..STRIP-1; number: that of the strip's first run. */
+static struct row row_of(const struct stretches *s, int y, uint32_t number)
+{
+    return (struct row){s->run + s->row[y], s->row[y + 1] - s->row[y], number + s->row[y]};
+}
+
+static size_t good_of(const struct stretches *s, size_t i)
+{
+    return s->good ? s->good[i] : (size_t)(s->run[i].x1 - s->run[i].x0);
+}
+
 /* parent[i] = the first run of run i's component. */
 static void join_strip(const struct stretches *s, uint32_t *parent)
 {
-    struct row up = {0}, here = {0};
     for (size_t i = 0; i < s->nrun; i++)
         parent[i] = (uint32_t)i;
-    for (size_t i = 0; i < s->nrun; i += here.n) {
-        here.run = s->run + i;
-        for (here.n = 1; i + here.n < s->nrun && here.run[here.n].y == here.run->y;)
-            here.n++;
-        if (up.n && up.run->y + 1 == here.run->y)
-            join_rows(up, here, parent);
-        up = here;
-        here.number += (uint32_t)here.n;
-    }
+    for (int y = 1; y < STRIP; y++)
+        join_rows(row_of(s, y - 1, 0), row_of(s, y, 0), parent);
     for (size_t i = 0; i < s->nrun; i++)   /* parents come first and know their roots */
         parent[i] = parent[parent[i]];
 }
@@ -415,16 +424,16 @@ static int strip_new(struct strip *to, const struct stretches *s, const uint32_t
             pixels += (size_t)(s->run[i].x1 - s->run[i].x0);
         }
     to->s.run = malloc((runs + 1) * sizeof *to->s.run);
+    to->s.good = s->good ? malloc((runs + 1) * sizeof *to->s.good) : NULL;
     to->s.pair = malloc((2 * pixels + 1) * sizeof *to->s.pair);
-    to->parent = malloc((runs + 1) * sizeof *to->parent);
-    return to->s.run && to->s.pair && to->parent ? OK : E_NOMEM;
+    return to->s.run && (to->s.good || !s->good) && to->s.pair ? OK : E_NOMEM;
 }
 
 /*
  * Find the components of what was found and leave out those of fewer than min_area good pixels that no row before `first` or
- * behind `last` can go on with: most runs of an image are noise.  What stays keeps its order.
+ * behind `last` of the strip can go on with: most runs of an image are noise.  What stays keeps its order.
  */
-static int prune_strip(struct scratch *w, long first, long last, long min_area, struct strip *to)
+static int prune_strip(struct scratch *w, int first, int last, long min_area, struct strip *to)
 {
     const uint32_t OPEN = 1u << 31;        /* a strip has fewer pixels */
     const struct stretches *s = &w->found;
@@ -436,25 +445,26 @@ static int prune_strip(struct scratch *w, long first, long last, long min_area, 
     uint32_t *parent = w->parent, *count = w->count;
     join_strip(s, parent);
     memset(count, 0, s->nrun * sizeof *count);
-    for (size_t i = 0; i < s->nrun; i++) {
-        const struct stretch *r = &s->run[i];
-        count[parent[i]] = (count[parent[i]] + r->good) | (r->y < first || r->y > last ? OPEN : 0);
-    }
+    for (int y = 0; y < STRIP; y++)
+        for (size_t i = s->row[y]; i < s->row[y + 1]; i++)
+            count[parent[i]] = (count[parent[i]] + (uint32_t)good_of(s, i)) | (y < first || y > last ? OPEN : 0);
     st = strip_new(to, s, parent, count, min_area);
     const float *from = s->pair;
-    for (size_t i = 0; i < s->nrun && !st; i++) {
-        const struct stretch r = s->run[i];
-        const size_t many = (size_t)(r.x1 - r.x0);
-        if (parent[i] == i)                /* from here on: 1 + the place of the first run, 0 left out */
-            count[i] = count[i] >= (size_t)min_area ? (uint32_t)to->s.nrun + 1 : 0;
-        if (count[parent[i]]) {
-            memcpy(to->s.pair + 2 * to->s.npix, from, 2 * many * sizeof *from);
-            to->s.npix += many;
-            to->s.run[to->s.nrun] = r;
-            to->parent[to->s.nrun++] = count[parent[i]] - 1;
+    for (int y = 0; y < STRIP && !st; y++) {
+        to->s.row[y] = (uint32_t)to->s.nrun;
+        for (size_t i = s->row[y]; i < s->row[y + 1]; i++) {
+            const size_t many = (size_t)(s->run[i].x1 - s->run[i].x0);
+            if (count[parent[i]] >= (size_t)min_area) {
+                memcpy(to->s.pair + 2 * to->s.npix, from, 2 * many * sizeof *from);
+                to->s.npix += many;
+                if (s->good)
+                    to->s.good[to->s.nrun] = s->good[i];
+                to->s.run[to->s.nrun++] = s->run[i];
+            }
+            from += 2 * many;
         }
-        from += 2 * many;
     }
+    to->s.row[STRIP] = (uint32_t)to->s.nrun;
     return st;
 }
 
@@ -505,8 +515,10 @@ static int search_strip(const struct search *s, long i, struct scratch *w)
         }
         st = scan_row(&w->found, &row, nx, r);
     }
+    for (long y = y1 - y0; y <= STRIP; y++)
+        w->found.row[y] = (uint32_t)w->found.nrun;
     if (!st)
-        st = prune_strip(w, y0 > 0 ? y0 + 1 : 0, y1 < s->im->ny ? y1 - 2 : y1, min_area, &s->strip[i]);
+        st = prune_strip(w, y0 > 0 ? 1 : 0, y1 < s->im->ny ? STRIP - 2 : STRIP, min_area, &s->strip[i]);
     return st;
 }
 
@@ -546,6 +558,7 @@ static int search_all(struct search *s, long n)
         free(s->scratch[i].above);
         free(s->scratch[i].bits);
         free(s->scratch[i].found.run);
+        free(s->scratch[i].found.good);
         free(s->scratch[i].found.pair);
         free(s->scratch[i].parent);
         free(s->scratch[i].count);
@@ -556,64 +569,81 @@ static int search_all(struct search *s, long n)
 
 /* ---- components of the image: runs are numbered through all strips; there are fewer than 2^15 of them in a row, 2^31 in all ---- */
 
-/* The runs of a strip's first row, or of its last one; number: that of the strip's first run. */
-static struct row border_row(const struct stretches *s, int last, uint32_t number)
+struct joining {
+    const struct strip *strip;
+    const size_t *number;      /* of each strip's first run */
+    uint32_t *parent;
+};
+
+/* Components inside strips. */
+static int join_inside(void *ctx, long begin, long end, int worker)
 {
-    size_t n = 0;
-    if (s->nrun == 0)
-        return (struct row){0};
-    const struct stretch *end = s->run + (last ? s->nrun - 1 : 0);
-    while (n < s->nrun && (last ? end - n : end + n)->y == end->y)
-        n++;
-    return last ? (struct row){s->run + s->nrun - n, n, number + (uint32_t)(s->nrun - n)} : (struct row){s->run, n, number};
+    const struct joining *t = ctx;
+    (void)worker;
+    for (long k = begin; k < end; k++) {
+        uint32_t *parent = t->parent + t->number[k];
+        join_strip(&t->strip[k].s, parent);
+        for (size_t i = 0; i < t->strip[k].s.nrun; i++)
+            parent[i] += (uint32_t)t->number[k];
+    }
+    return OK;
 }
 
 /* parent[i] = the first run of run i's component. */
-static void join_strips(struct strip *strip, long n, uint32_t *parent, size_t nrun)
+static int join_strips(const struct strip *strip, long n, const size_t *number, uint32_t *parent, struct par_team *team)
 {
-    struct row up = {0};
-    uint32_t number = 0;
-    for (long k = 0; k < n; k++) {
-        for (size_t i = 0; i < strip[k].s.nrun; i++)
-            parent[number + i] = number + strip[k].parent[i];
-        free(strip[k].parent);
-        strip[k].parent = NULL;
-        struct row here = border_row(&strip[k].s, 0, number);
-        if (up.n && here.n && up.run->y + 1 == here.run->y)
-            join_rows(up, here, parent);
-        up = border_row(&strip[k].s, 1, number);
-        number += (uint32_t)strip[k].s.nrun;
-    }
-    for (size_t i = 0; i < nrun; i++)
+    struct joining t = {strip, number, parent};
+    int st = par_team_for(team, n, 1, join_inside, &t);
+    for (long k = 1; k < n && !st; k++)
+        join_rows(row_of(&strip[k - 1].s, STRIP - 1, (uint32_t)number[k - 1]), row_of(&strip[k].s, 0, (uint32_t)number[k]), parent);
+    for (size_t i = 0; i < number[n] && !st; i++)
         parent[i] = parent[parent[i]];
-    if (nrun > RETURN)
-        pages_return();
+    return st;
 }
 
-/*
- * Number the components of at least min_area good pixels from 1, in order of their first runs, into number[] at these, 0
- * for the others; count the runs of number c into first[c + 1], their pixels into at[c + 1].
- */
-static int count_components(struct segments *s, const struct strip *strip, long n, const uint32_t *parent,
-                            uint32_t *number, size_t nrun, long min_area)
+/* What `parent` holds of a first run, once all are joined: this bit and a count, then the number of its component. */
+static const uint32_t ROOT = 1u << 31;
+
+/* The number of run i's component, 0: left out. */
+static uint32_t component_of(const uint32_t *parent, size_t i)
+{
+    return (parent[i] & ROOT ? parent[i] : parent[parent[i]]) & ~ROOT;
+}
+
+/* Count the good pixels of each component at its first run, as far as min_area; how many components have as many. */
+static size_t count_good(const struct strip *strip, long n, uint32_t *parent, long min_area)
 {
     size_t i = 0, ncomp = 0;
     for (long k = 0; k < n; k++)
-        for (size_t j = 0; j < strip[k].s.nrun; j++, i++)
-            number[parent[i]] += strip[k].s.run[j].good;
-    for (i = 0; i < nrun; i++)
-        ncomp += number[i] >= (size_t)min_area;
+        for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
+            const size_t root = parent[i] == i ? i : parent[i];
+            if (root == i)
+                parent[i] = ROOT;
+            const uint32_t before = parent[root] & ~ROOT, now = before + (uint32_t)good_of(&strip[k].s, j);
+            parent[root] = ROOT | (now < (uint32_t)min_area ? now : (uint32_t)min_area);
+            ncomp += before < (uint32_t)min_area && now >= (uint32_t)min_area;
+        }
+    return ncomp;
+}
+
+/*
+ * Number the components of at least min_area good pixels from 1, in order of their first runs, into `parent` at these, 0
+ * for the others; count the runs of number c into first[c + 1], their pixels into at[c + 1].
+ */
+static int count_components(struct segments *s, const struct strip *strip, long n, uint32_t *parent, long min_area)
+{
+    const size_t ncomp = count_good(strip, n, parent, min_area);
     s->first = calloc(ncomp + 2, sizeof *s->first);
     s->at = calloc(ncomp + 2, sizeof *s->at);
     if (!s->first || !s->at)
         return E_NOMEM;
-    i = 0;
+    size_t i = 0;
     for (long k = 0; k < n; k++)
         for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
             const struct stretch *r = &strip[k].s.run[j];
-            if (parent[i] == i)
-                number[i] = number[i] >= (size_t)min_area ? (uint32_t)++s->ncomponent : 0;
-            uint32_t c = number[parent[i]];
+            if (parent[i] & ROOT)
+                parent[i] = ROOT | ((parent[i] & ~ROOT) >= (uint32_t)min_area ? (uint32_t)++s->ncomponent : 0);
+            uint32_t c = component_of(parent, i);
             if (c == 0)
                 continue;
             s->first[c + 1]++;
@@ -621,30 +651,31 @@ static int count_components(struct segments *s, const struct strip *strip, long 
             s->at[c + 1] += (size_t)(r->x1 - r->x0);
             s->npix += (size_t)(r->x1 - r->x0);
         }
-    return OK;
-}
-
-/* Every run that stays gets its place, and one for its pixels, which is put where its parent was: nobody asks for that again. */
-static void place_runs(struct segments *s, struct strip *strip, long n, uint32_t *parent, const uint32_t *number)
-{
-    size_t i = 0;
-    for (size_t c = 0; c < s->ncomponent; c++) {       /* now number c begins at first[c] and at[c] */
+    for (size_t c = 0; c < s->ncomponent; c++) {       /* now number c ends at first[c + 1] and at[c + 1] */
         s->first[c + 2] += s->first[c + 1];
         s->at[c + 2] += s->at[c + 1];
     }
-    for (long k = 0; k < n; k++) {
-        strip[k].place = parent + i;
-        for (size_t j = 0; j < strip[k].s.nrun; j++, i++) {
-            const struct stretch *r = &strip[k].s.run[j];
-            uint32_t c = number[parent[i]];
-            parent[i] = NOWHERE;
+    return OK;
+}
+
+/* Every run of strip k that stays gets its place, and one for its pixels, from the last on; number: of the strip's first run. */
+static int place_runs(struct segments *s, struct strip *strip, long k, const uint32_t *parent, size_t number)
+{
+    strip->place = malloc((strip->s.nrun + 1) * sizeof *strip->place);
+    if (!strip->place)
+        return E_NOMEM;
+    for (long y = STRIP - 1; y >= 0; y--)
+        for (size_t j = strip->s.row[y + 1]; j-- > strip->s.row[y];) {
+            const struct stretch *r = &strip->s.run[j];
+            uint32_t c = component_of(parent, number + j);
+            strip->place[j] = NOWHERE;
             if (!c)
                 continue;
-            s->run[s->first[c]++] = (struct run){r->y, r->x0, r->x1};
-            parent[i] = (uint32_t)s->at[c];
-            s->at[c] += (size_t)(r->x1 - r->x0);
+            s->run[--s->first[c + 1]] = (struct run){(uint16_t)(k * STRIP + y), r->x0, r->x1};
+            s->at[c + 1] -= (size_t)(r->x1 - r->x0);
+            strip->place[j] = (uint32_t)s->at[c + 1];
         }
-    }
+    return OK;
 }
 
 struct moving {
@@ -677,32 +708,50 @@ static int move_pixels(void *ctx, long begin, long end, int worker)
     return OK;
 }
 
+/* Runs and pixels to their components, a block of runs at a time from the last on: what these took goes before the next are placed. */
+static int move_strips(struct segments *s, struct strip *strip, long n, const size_t *number, uint32_t **parent, struct par_team *team)
+{
+    int st = OK;
+    for (long end = n, k; end > 0 && !st; end = k) {
+        for (k = end; k > 0 && (k == end || number[end] - number[k - 1] <= TOGETHER) && !st; k--)
+            st = place_runs(s, &strip[k - 1], k - 1, *parent, number[k - 1]);
+        struct moving m = {s, strip + k};
+        if (!st)
+            st = par_team_for(team, end - k, 1, move_pixels, &m);
+        uint32_t *less = realloc(*parent, (number[k] + 1) * sizeof **parent);
+        *parent = less ? less : *parent;
+    }
+    for (size_t c = 0; c <= s->ncomponent && !st; c++) {       /* number c + 1 begins at first[c + 2] now */
+        s->first[c] = c < s->ncomponent ? s->first[c + 2] : s->nrun;
+        s->at[c] = c < s->ncomponent ? s->at[c + 2] : s->npix;
+    }
+    return st;
+}
+
 /* The runs and pixels that stay, grouped by component; strips are freed on the way. */
 static int group_runs(struct segments *s, struct strip *strip, long n, long min_area, struct par_team *team)
 {
-    size_t nrun = 0;
+    size_t *number = malloc(((size_t)n + 1) * sizeof *number);
+    if (!number)
+        return E_NOMEM;
+    number[0] = 0;
     for (long k = 0; k < n; k++)
-        nrun += strip[k].s.nrun;
-    uint32_t *parent = malloc((nrun + 1) * sizeof *parent), *number = calloc(nrun + 1, sizeof *number);
-    int st = parent && number ? OK : E_NOMEM;
-    if (!st) {
-        join_strips(strip, n, parent, nrun);
-        st = count_components(s, strip, n, parent, number, nrun, min_area);
-    }
+        number[k + 1] = number[k] + strip[k].s.nrun;
+    uint32_t *parent = malloc((number[n] + 1) * sizeof *parent);
+    int st = parent ? join_strips(strip, n, number, parent, team) : E_NOMEM;
+    if (!st)
+        st = count_components(s, strip, n, parent, min_area);
     if (!st) {
         s->run = malloc((s->nrun + 1) * sizeof *s->run);
         s->smooth = malloc((s->npix + 1) * sizeof *s->smooth);
         s->value = malloc((s->npix + 1) * sizeof *s->value);
         st = s->run && s->smooth && s->value ? OK : E_NOMEM;
     }
-    if (!st) {
-        struct moving m = {s, strip};
-        place_runs(s, strip, n, parent, number);
-        free(number);
-        number = NULL;
-        st = par_team_for(team, n, 1, move_pixels, &m);
-    }
+    if (!st)
+        st = move_strips(s, strip, n, number, &parent, team);
     free(parent);
+    if (number[n] > RETURN)
+        pages_return();
     free(number);
     return st;
 }
