@@ -1,12 +1,12 @@
 /*
  * detect.h - from an image to measured objects: background, filter, threshold,
  * deblending, cleaning, photometry.  Linear in pixels plus detected pixels;
- * 4 bytes per pixel of an image in memory (none of one that stays in its file, pixels.h), 4 with a weight map, plus 12 bytes for each detected
- * pixel and 14 for each run of them while objects are being separated, and up to
+ * 4 bytes per pixel of an image in memory (none of one that stays in its file, pixels.h), 4 with a weight map, plus 8 bytes for
+ * each detected pixel and 10 for each run of them while objects are separated (16 together where a run is a pixel by itself), and up to
  * 90 for the pixels of the component in hand: a component larger than DETECT_MOST
  * pixels and a DETECT_PART of the image is not split, gets the flag
- * DETECT_UNSEPARATED, and all stays below 32 MiB + 12 bytes per pixel (16 where every
- * second pixel is a run by itself) and what the rows of the catalogue take (about 450 bytes each).
+ * DETECT_UNSEPARATED, and all stays below 32 MiB + 12.6 bytes per pixel, the pages of the file with it,
+ * and what the rows of the catalogue take (about 450 bytes each).
  */
 #ifndef PIXSHEAR_DETECT_H
 #define PIXSHEAR_DETECT_H

@@ -336,8 +336,81 @@ static void too_large(void)
     done(&d);
 }
 
+/* Filtered and unfiltered values differ: each sum takes its own.  1 or 2 objects; owners in a place of their own, or in that of the values. */
+static void two_values(int objects, int in_place)
+{
+    enum { W = 31, H = 9, X0 = 40, Y0 = 7 };
+    static struct run run[H];
+    float smooth[W * H], value[W * H];
+    int32_t apart[W * H];
+    size_t first[2] = {0, H}, at[2] = {0, W * H};
+    double flux = 0, sum = 0, mx = 0, most = 0;
+    long above = 0, top = 0;
+    for (int y = 0; y < H; y++) {
+        run[y] = (struct run){(uint16_t)(Y0 + y), X0, X0 + W};
+        for (int x = 0; x < W; x++) {
+            double f = 2 + 90 * exp(-0.3 * (pow(x - 5, 2) + pow(y - 3, 2))) + (objects > 1 ? 80 : 0) * exp(-0.3 * (pow(x - 24, 2) + pow(y - 5, 2)));
+            int i = y * W + x;
+            smooth[i] = (float)f;
+            value[i] = (float)(7 * exp(-0.02 * (pow(x - 17, 2) + pow(y - 6, 2))) - 1);
+            flux += (double)value[i];
+            sum += (double)smooth[i];
+            mx += (double)smooth[i] * x;
+            most = (double)smooth[i] > most ? (double)smooth[i] : most;
+            above += (double)value[i] > 1.5;
+            top = value[i] > value[top] ? i : top;
+        }
+    }
+    struct segments s = {H, W * H, run, smooth, value, 1, first, at};
+    struct deblend_params p = {32, 0.005, 5, 3, 1.5, NULL, 0, 0};
+    struct deblend_work *w;
+    struct blob_list list = {0};
+    int32_t *owner = in_place ? (int32_t *)(void *)smooth : apart;
+    if (deblend_work_new(&w) || deblend_component(&s, 0, &p, w, owner, &list)) {
+        check_that(0, "two kinds of values");
+        return;
+    }
+    check_that((int)list.n == objects, "two kinds of values: %d objects, %zu found", objects, list.n);
+    struct check c = check_begin("flux and peak of the image, moments and highest value of the filtered one");
+    double got = 0, s_got = 0, sx = 0, highest = 0, peak = -1;
+    long n = 0, over = 0, place = -1;
+    for (size_t k = 0; k < list.n; k++) {
+        const struct blob *b = &list.blob[k];
+        got += b->flux;
+        s_got += b->s;
+        sx += b->sx + b->s * (b->x0 - X0);
+        highest = b->smooth_peak > highest ? b->smooth_peak : highest;
+        n += b->n;
+        over += b->above;
+        if (b->peak > peak) {
+            peak = b->peak;
+            place = (b->ypeak - Y0) * W + b->xpeak - X0;
+        }
+    }
+    check_close(&c, got, flux, 1e-9 * fabs(flux));
+    check_close(&c, s_got, sum, 1e-6 * sum);       /* shared light is divided in doubles */
+    check_close(&c, sx, mx, 1e-6 * mx);
+    check_close(&c, highest, most, 0.001 * (objects > 1) + 1e-12);
+    check_close(&c, peak, (double)value[top], 1e-12);
+    check_close(&c, (double)place, (double)top, 0.5);
+    check_close(&c, (double)over, (double)above, 0.5);
+    check_close(&c, (double)n, W * H, 0.5);
+    check_end(&c);
+    if (objects > 1) {
+        int32_t left, right;
+        memcpy(&left, &owner[3 * W + 5], sizeof left);
+        memcpy(&right, &owner[5 * W + 24], sizeof right);
+        check_that(left != right && left >= 0 && right >= 0 && left < 2 && right < 2, "owners of the two");
+    }
+    deblend_work_free(w);
+    free(list.blob);
+}
+
 int main(void)
 {
+    two_values(1, 0);
+    two_values(2, 0);
+    two_values(2, 1);
     pairs();
     too_large();
     against_slow();

@@ -149,6 +149,11 @@ static void filtered(void)
     if (segment_find(&one, &pix, &b, &f, &p) || segment_find(&two, &pix, &b, &f, &p2))
         return;
     par_team_free(team);
+    int own = 1;
+    for (size_t i = 0, at = 0; i < one.nrun; i++)
+        for (long x = one.run[i].x0; x < one.run[i].x1; x++, at++)
+            own &= one.smooth[at] == whole[one.run[i].y * NX + x] && one.value[at] == im.pix[one.run[i].y * NX + x];
+    check_that(own && one.npix > 1000, "pixels have their filtered and their unfiltered value");
     check_that(one.nrun == two.nrun && !memcmp(one.run, two.run, one.nrun * sizeof *one.run)
                && !memcmp(one.smooth, two.smooth, one.npix * sizeof(float)), "1 and 2 threads: same runs, %zu", one.nrun);
     segment_free(&one);
