@@ -18,9 +18,9 @@ cpu() {
 # versus LABEL "COMMAND A" "COMMAND B": medians of both and of the ratio B/A
 versus() {
     local i a b
-    bash -c "$2" >/dev/null 2>&1; bash -c "$3" >/dev/null 2>&1
+    (eval "$2"; eval "$3") >/dev/null 2>&1
     for ((i = 0; i < RUNS; i++)); do
-        a=$(seconds bash -c "$2") b=$(seconds bash -c "$3")
+        a=$(seconds eval "$2") b=$(seconds eval "$3")
         echo "$a $b"
     done >pairs
     printf '%-52s %8.3f s, peer %8.3f s, ratio %6.2f\n' "$1" "$(cut -d' ' -f1 pairs | median)" "$(cut -d' ' -f2 pairs | median)" \
