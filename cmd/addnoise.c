@@ -7,6 +7,7 @@
 #include "noise.h"
 #include "opt.h"
 #include "progress.h"
+#include "psfio.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -57,13 +58,9 @@ static double psf_area(const struct request *r, const struct common *c)
     struct err e;
     if (image_read(&im, r->psf, c->max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    double scale = r->psf_scale;
-    static const char *const key[] = {"PIXELSCL", "PIXSCALE"};
-    for (int i = 0; i < 2 && isnan(scale); i++)
-        if (header_double(&im.hdr, key[i], &scale) == E_DATA)
-            die(EXIT_RUN, "%s: %s is not a number: correct the keyword", r->psf, key[i]);
-    if (!(scale > 0))
-        die(EXIT_RUN, "%s: no keyword PIXELSCL: give --psf-scale", r->psf);
+    double scale;
+    if (psf_sampling(r->psf, &im.hdr, r->psf_scale, &scale, &e))
+        die(EXIT_RUN, "%s", e.text);
     double area = noise_psf_area((long)image_count(&im), im.pix, scale);
     if (!(area > 0 && area < INFINITY))
         die(EXIT_RUN, "%s: not a PSF: sum or sum of squares is not positive", r->psf);
@@ -103,6 +100,9 @@ static void decide(const struct work *w, struct plan *p)
         die(EXIT_RUN, "%s: has noise already (NOISSEED): noise is drawn from expected electrons", p->label);
     if (x->unit != UNIT_NONE && x->unit != UNIT_ELECTRON)
         die(EXIT_RUN, "%s: BUNIT is not electron: noise is drawn from expected electrons", p->label);
+    struct err e;
+    if (r->definition != DEPTH_AREA && exposure_square(x, p->label, &e) == E_DATA)
+        die(EXIT_RUN, "%s", e.text);
     p->time = isnan(x->exptime) ? r->exptime : x->exptime;
     const double scale = isnan(x->scale) ? r->scale : x->scale;
     if (fabs(r->exptime / x->exptime - 1) > 1e-9)

@@ -179,6 +179,11 @@ static void read_frame(struct frame *f, const char *in, const struct options *o,
     struct exposure x = {0};
     if (exposure_keywords(h, in, &x, &e))
         die(EXIT_RUN, "%s", e.text);
+    const int square = exposure_square(&x, in, &e);
+    if (square == E_DATA)
+        die(EXIT_RUN, "%s", e.text);
+    if (square && !c->quiet)
+        warn("%s", e.text);
     int wcs = sky_open(&f->sky, h, &e);
     if (wcs == E_NOMEM)
         die(EXIT_RUN, "%s: %s", in, e.text);

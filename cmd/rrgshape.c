@@ -125,14 +125,20 @@ static void read_map(struct image *im, const struct input *in, const char *name,
 
 /* Image, catalogue and maps; weight and segmentation may be NULL. */
 static void read_input(struct input *in, const char *image, const char *cat, const struct params *p,
-                       const char *weight, const char *label, double max_memory)
+                       const char *weight, const char *label, const struct common *c)
 {
     struct err e;
     struct exposure x = {0};
+    const double max_memory = c->max_memory;
     *in = (struct input){0};
     read_pixels(in, image, max_memory);
     if (exposure_keywords(&in->hdr, image, &x, &e))
         die(EXIT_RUN, "%s", e.text);
+    const int square = exposure_square(&x, image, &e);
+    if (square == E_DATA)
+        die(EXIT_RUN, "%s", e.text);
+    if (square && !c->quiet)
+        warn("%s", e.text);
     in->cat_name = cat;
     if (table_in_open(&in->rows, &in->cat, cat, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
@@ -310,7 +316,7 @@ static struct starmom *find_psf(struct starmom *s, const struct input *in, const
         return s;
     }
     struct input stars;
-    read_input(&stars, p->star_image, p->star_cat, p, NULL, NULL, c->max_memory);
+    read_input(&stars, p->star_image, p->star_cat, p, NULL, NULL, c);
     same_pixels(p->star_image, stars.scale, in);
     measure_stars(s, &stars, p->star_cat, p, c->threads, own);
     free_input(&stars);
@@ -566,7 +572,7 @@ int main(int argc, char **argv)
     struct input in;
     struct outputs out = {.record = opt_record(&prog, own, &c)};
     out.n_inputs = inputs_of(&p, &c, out.inputs);
-    read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, c.max_memory);
+    read_input(&in, c.argv[0], c.argv[1], &p, p.weight, p.segmentation, &c);
     if (p.stars_only)
         measure_curve(&in, &p, &c, &out);
     else

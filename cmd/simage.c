@@ -33,6 +33,7 @@
 #include <string.h>
 #include <time.h>
 
+#define PSF_FLUX_DOUBT 0.05    /* a PSF that lacks more, or has more, is told */
 #define BASE_MB 12             /* what --check adds for program, libraries, PSF and the rows being drawn */
 #define BLOCK 16384            /* objects, or Gaussians of their profiles, that are planned and drawn together */
 
@@ -144,6 +145,8 @@ static void read_psf(struct input *in, const struct request *r, const struct com
     o.max_memory = c->max_memory;
     if (psf_read(r->psf, &o, &in->otf, &in->psf, &e))
         die(EXIT_RUN, "%s", e.text);
+    if (!c->quiet && !o.normalise && !(fabs(in->psf.flux - 1) <= PSF_FLUX_DOUBT))
+        warn("%s: its flux is %.6g, not 1, and all objects' is multiplied by it: --psf-normalise divides it out", r->psf, in->psf.flux);
     if (r->diffusion > 0 && in->otf.chdiff > 0)
         die(EXIT_RUN, "%s: charge diffusion of %g\" is in the PSF already (CHDIFF): leave --diffusion out or make the PSF "
             "with psfgen --diffusion 0", r->psf, in->otf.chdiff);

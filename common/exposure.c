@@ -86,10 +86,11 @@ static int number(const struct header *h, const char *label, const char *key, do
 }
 
 /* PIXSCALE against the scale of the WCS; either may be missing. */
-static int check_scale(const struct header *h, const char *label, double *scale, struct err *e)
+static int check_scale(const struct header *h, const char *label, double *scale, double *ratio, struct err *e)
 {
-    double found, ratio;
-    const int wcs = sky_pixels(h, &found, &ratio, NULL);
+    double found;
+    *ratio = 1;
+    const int wcs = sky_pixels(h, &found, ratio, NULL);
     if (wcs == E_NOMEM)
         return err_set(e, wcs, "%s: %s", label, err_text(wcs));
     if (wcs == OK) {
@@ -134,10 +135,21 @@ int exposure_keywords(const struct header *h, const char *label, struct exposure
         return err_set(e, E_DATA, "%s: EXPTIME or TOTTIME is not positive", label);
     if (new.gain <= 0)
         return err_set(e, E_DATA, "%s: GAIN %g is not positive: correct the keyword", label, new.gain);
-    st = check_scale(h, label, &new.scale, e);
+    st = check_scale(h, label, &new.scale, &new.ratio, e);
     if (st == OK)
         *x = new;
     return st;
+}
+
+int exposure_square(const struct exposure *x, const char *label, struct err *e)
+{
+    if (x->ratio <= 1.01)
+        return OK;
+    if (x->ratio <= 1.5)
+        return err_set(e, E_RANGE, "%s: pixels on the sky are longer one way than the other by a factor %.3f: taken as squares of %g arcsec",
+                       label, x->ratio, x->scale);
+    return err_set(e, E_DATA, "%s: pixels on the sky are longer one way than the other by a factor %.3g: squares are needed, drizzle makes them",
+                   label, x->ratio);
 }
 
 int exposure_read(struct fits_in *f, const char *name, int index, struct exposure *x, struct err *e)

@@ -23,6 +23,7 @@ struct exposure {
     double tottime;        /* TOTTIME, s, of all exposures of the observation; else EXPTIME */
     double magzero;        /* MAGZERO of BUNIT; NaN when missing */
     double scale;          /* PIXSCALE, else of the WCS, arcsec; NaN when unknown */
+    double ratio;          /* longest diameter of a pixel on the sky over the shortest, by the WCS; 1 without one */
     double gain;           /* GAIN, electrons per unit; NaN when missing */
     long expnum;           /* EXPNUM, -1 when missing */
 };
@@ -34,6 +35,12 @@ struct exposure {
  * the WCS by more than 1e-3.  `label` begins the messages.
  */
 MUST_CHECK int exposure_keywords(const struct header *h, const char *label, struct exposure *x, struct err *e);
+
+/*
+ * For programs to which a pixel is a square: OK to 1 %, E_RANGE (to be told: cameras distort, HST's by up to 15 %) to a factor 1.5,
+ * E_DATA (refuse) beyond; e tells.
+ */
+MUST_CHECK int exposure_square(const struct exposure *x, const char *label, struct err *e);
 
 /*
  * HDU indices of the exposures of an open file: *list is allocated, *n of them.

@@ -14,6 +14,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#define SAME_SCALE 1e-3        /* two that tell the scale agree, and the sides of a pixel */
+
 static void base_name(const char *name, char *base, size_t size)
 {
     const char *slash = strrchr(name, '/');
@@ -114,6 +116,9 @@ static int read_otf(struct fits_in *f, const char *name, int index, const struct
 {
     const struct hdu *d = fits_in_hdu(f, index);
     double cx, cy, dx, dy, *v = NULL;
+    if (o->scale > 0)
+        return err_set(e, E_DATA, "%s: --psf-scale is of an image of a PSF, but the extension OTF is read: leave it out or name the image, %s[0]",
+                       name, name);
     if (d->nx != d->ny || d->nx % 2 == 0 || d->nz > 2)
         return err_set(e, E_DATA, "%s: extension OTF is %ld x %ld x %ld, not n x n x 2 with odd n", name, d->nx, d->ny, d->nz);
     if (header_double(h, "CDELT1", &dx) || header_double(h, "CDELT2", &dy) || header_double(h, "CRPIX1", &cx) ||
@@ -153,25 +158,50 @@ static int read_otf(struct fits_in *f, const char *name, int index, const struct
     return status;
 }
 
-/* Arcsec per sample: option, PIXELSCL, PIXSCALE, GalSim's GS_SCALE, WCS. */
-static int sampling(const char *name, const struct header *h, const struct psf_options *o, double *scale, struct err *e)
+/* The scale of the WCS, where there is one, against that of a keyword (NaN: none); pixels must be square. */
+static int sampling_by_wcs(const char *name, const struct header *h, const char *key, double *scale, struct err *e)
+{
+    double found, ratio;
+    const int st = sky_pixels(h, &found, &ratio, NULL);
+    if (st == E_NOMEM)
+        return err_set(e, st, "%s: %s", name, err_text(st));
+    if (st)
+        return OK;
+    if (!(ratio <= 1 + SAME_SCALE))
+        return err_set(e, E_DATA, "%s: pixels are not square by the WCS (sides as 1 : %.4g): resample it, or give --psf-scale", name, ratio);
+    if (isnan(*scale))
+        *scale = found;
+    else if (!(fabs(found / *scale - 1) <= SAME_SCALE))
+        return err_set(e, E_DATA, "%s: %s %g and the WCS's %g arcsec differ: give --psf-scale", name, key, *scale, found);
+    return OK;
+}
+
+int psf_sampling(const char *name, const struct header *h, double option, double *scale, struct err *e)
 {
     static const char *const keys[] = {"PIXELSCL", "PIXSCALE", "GS_SCALE"};
-    *scale = o->scale;
-    if (*scale > 0)
+    const char *first = NULL;
+    double known = NAN, v;
+    if (option > 0) {
+        *scale = option;
         return OK;
-    for (int k = 0; k < 3; k++) {
-        int status = header_double(h, keys[k], scale);
-        if (status == OK && *scale > 0)
-            return OK;
-        if (status != E_MISSING)
-            return err_set(e, E_DATA, "%s: %s is not a positive number: give --psf-scale", name, keys[k]);
     }
-    double ratio;
-    if (sky_pixels(h, scale, &ratio, NULL) != OK)
+    for (int k = 0; k < 3; k++) {
+        const int status = header_double(h, keys[k], &v);
+        if (status == E_MISSING)
+            continue;
+        if (status || !(v > 0))
+            return err_set(e, E_DATA, "%s: %s is not a positive number: give --psf-scale", name, keys[k]);
+        if (first && !(fabs(v / known - 1) <= SAME_SCALE))
+            return err_set(e, E_DATA, "%s: %s %g and %s %g differ: give --psf-scale", name, first, known, keys[k], v);
+        known = first ? known : v;
+        first = first ? first : keys[k];
+    }
+    const int status = sampling_by_wcs(name, h, first, &known, e);
+    if (status)
+        return status;
+    if (!(known > 0) || !isfinite(known))
         return err_set(e, E_DATA, "%s: no PIXELSCL, PIXSCALE, GS_SCALE or WCS tells the PSF's sampling: give --psf-scale", name);
-    if (!(*scale > 0) || !isfinite(*scale))
-        return err_set(e, E_DATA, "%s: the WCS gives no pixel scale: give --psf-scale", name);
+    *scale = known;
     return OK;
 }
 
@@ -182,7 +212,7 @@ static int read_samples(struct fits_in *f, const char *name, int index, const st
     double scale, *v = NULL;
     if (d->nz != 1)
         return err_set(e, E_DATA, "%s: a cube of %ld planes: choose one PSF and write it as an image", name, d->nz);
-    int status = sampling(name, h, o, &scale, e);
+    int status = psf_sampling(name, h, o->scale, &scale, e);
     double cx = (double)(d->nx + 1) / 2, cy = (double)(d->ny + 1) / 2, unused, nyquist = 0.5 / scale, ucut = nyquist;
     if (status == OK)
         status = optional(name, h, "UCUT", &ucut, e);

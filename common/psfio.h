@@ -14,7 +14,7 @@
 
 /* What the user says about a PSF file; all zero means: what the file says. */
 struct psf_options {
-    double scale;          /* arcsec per sample, over the header's; PSFEx: per pixel of its image */
+    double scale;          /* arcsec per sample, over the header's; PSFEx: per pixel of its image; refused with an OTF */
     int at;                /* x, y are given: position (FITS pixels) at which a PSFEx model is wanted */
     double x, y;
     double cutoff;         /* transform is 0 beyond |u_x|,|u_y| = cutoff, cycles/arcsec */
@@ -45,6 +45,13 @@ struct psf_info {
  */
 MUST_CHECK int psf_read(const char *name, const struct psf_options *o, struct otf *t, struct psf_info *info,
                         struct err *e);
+
+/*
+ * Arcsec per sample of an image of a PSF: the option when positive, else PIXELSCL, PIXSCALE, GalSim's
+ * GS_SCALE, the WCS.  E_DATA when there is none, when two differ by more than 1e-3, or when the pixels of the WCS are not square
+ * to 1e-3.
+ */
+MUST_CHECK int psf_sampling(const char *name, const struct header *h, double option, double *scale, struct err *e);
 
 /*
  * Write image (nx x ny doubles, float32 in the file) and the table t with the cards h in both:

@@ -88,3 +88,49 @@ near "TSCAL2 = 2.0D0 doubles the column" "$(col scaled.txt B)" 5 0
 cutcat --only-where models.txt -o m.fits; n=$(($(grep -m1 '^# ID' models.txt | wc -w) - 1))
 number TNULL$n 1 m.fits galgen -n 2 --library BAD
 number THEAP x m.fits galgen -n 2 --library BAD
+
+# a PSF: what tells its sampling must agree and be of square pixels; an option that the OTF would not heed; its flux
+F="perl $TOP/tests/fits.pl"
+told() { if grep -q "$1" cmd.err; then pass "told"; else fail "not told '$1': $(cat cmd.err)"; fi; }
+P='exp(-(($x-16)**2+($y-16)**2)/18)/(18*atan2(0,-1))'
+S="simage scene.txt --models models.txt -x 0.1"
+psf() { $F make p.fits 33 33 "$P" "$@"; }
+tan() { # XSIDE YSIDE CARD...: a PSF with a WCS of these pixels, arcsec
+    local a b; a=$(awk -v s="$1" 'BEGIN { printf "%.14g", -s / 3600 }'); b=$(awk -v s="$2" 'BEGIN { printf "%.14g", s / 3600 }'); shift 2
+    psf "CTYPE1  = 'RA---TAN'" "CTYPE2  = 'DEC--TAN'" "CRPIX1  =                 17.0" "CRPIX2  =                 17.0" "CRVAL1  =                150.0" "CRVAL2  =                  2.2" \
+        "CD1_1   = $a" "CD1_2   =                  0.0" "CD2_1   =                  0.0" "CD2_2   = $b" "$@"
+}
+for c in "PIXSCALE=                 0.05" "GS_SCALE=                0.021"; do
+    psf "PIXELSCL=                 0.02" "$c"
+    fails "PIXELSCL 0.02 beside $c" 1 $S -p p.fits -o made; told "differ: give --psf-scale"
+    fails "addnoise" 1 addnoise --depth 27 --depth-definition point5 -p p.fits true.fits -o made; told "differ: give --psf-scale"
+    ok "and with --psf-scale" $S -p p.fits --psf-scale 0.02 -o made
+done
+psf "PIXELSCL=                 0.02" "PIXSCALE=           0.02000001"; ok "nearly the same are the same" $S -p p.fits -o made
+tan 0.02 0.02; ok "the sampling of a WCS" $S -p p.fits -o wcs.fits
+psf "PIXELSCL=                 0.02"; $S -p p.fits -o key.fits; near "is that of the keyword" "$(pix diff wcs.fits key.fits | cut -d' ' -f1)" 0 1e-6
+rm -f made
+tan 0.02 0.02 "PIXELSCL=                 0.01"; fails "PIXELSCL 0.01 beside a WCS of 0.02" 1 $S -p p.fits -o made; told "WCS's 0.02 arcsec differ"
+tan 0.02 0.03; fails "a PSF of rectangular pixels" 1 $S -p p.fits -o made; told "not square"
+fails "psfgen --from one" 1 psfgen --from p.fits -o made; told "not square"
+fails "--psf-scale with an OTF" 1 $S -p psf.fits --psf-scale 0.05 -o made; told "the extension OTF is read"
+fails "psfgen --from --psf-scale with an OTF" 1 psfgen --from psf.fits --psf-scale 0.05 -o made; told "the extension OTF is read"
+ok "but with its image" $S -p "psf.fits[0]" --psf-scale 0.05 -o made; rm -f made
+psf "PIXELSCL=                 0.02"; ok "a PSF of flux 1" $S -p p.fits -o made; [ -s cmd.err ] && fail "warned: $(cat cmd.err)" || pass "no word"
+$F make half.fits 33 33 "0.5*$P" "PIXELSCL=                 0.02"; ok "a PSF of flux 0.5" $S -p half.fits -o made; told "its flux is 0.5, not 1"
+ok "normalised" $S -p half.fits --psf-normalise -o made; [ -s cmd.err ] && fail "warned: $(cat cmd.err)" || pass "no word"
+
+# images of pixels that are not square: told to 1.5, as HST's cameras have them, refused beyond
+rect() { # RATIO: noisy.fits whose pixels are higher than wide
+    spoilt noisy.fits CD1_1 "$(awk -v r="$1" 'BEGIN { printf "%.14g", -0.1 / 3600 / sqrt(r) }')" >one.fits
+    spoilt one.fits CD2_2 "$(awk -v r="$1" 'BEGIN { printf "%.14g", 0.1 / 3600 * sqrt(r) }')" >rect.fits
+}
+rect 1.005; ok "pixels of 1 : 1.005" detect rect.fits -o made; [ -s cmd.err ] && fail "warned: $(cat cmd.err)" || pass "no word"
+rect 1.12; ok "pixels of 1 : 1.12" detect rect.fits -o made; told "by a factor 1.120"
+ok "rrgshape" rrgshape rect.fits cat.txt --psf none -o made; told "by a factor 1.120"; rm made
+rect 4; fails "pixels of 1 : 4" 1 detect rect.fits -o made; told "by a factor 4"
+fails "rrgshape" 1 rrgshape rect.fits cat.txt --psf none -o made; told "by a factor 4"
+spoilt true.fits CD1_1 -1.3e-5 >one.fits; spoilt one.fits CD2_2 5.934995e-5 >rect.fits
+fails "depth of a point in them" 1 addnoise --depth 27 --depth-definition point5 -p p.fits rect.fits -o made; told "by a factor"
+ok "that of an area needs no squares" addnoise --depth 27 rect.fits -o made
+ok "drizzle makes squares of them" drizzle rect.fits -x 0.1 --size 120,120 -o made
