@@ -374,6 +374,8 @@ static int add_columns(struct fits_rows *r)
         if (!isupper((unsigned char)c->name[0]))
             return bad(r, c, "the name does not begin with a letter");
         st = table_add(r->t, c->name, c->missing ? COL_REAL : c->type, unit, what);
+        if (st == OK)
+            r->t->col[r->t->ncol - 1].logical = c->letter == 'L';
     }
     return st == E_NOMEM ? no_memory(r) : st ? bad(r, NULL, "%s", err_text(st)) : OK;
 }

@@ -2,6 +2,7 @@
  * models.c - a shapelet catalogue checked, described and searched by ID.
  */
 #include "models.h"
+#include "unitname.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,6 +78,8 @@ static int fill(struct models *m, const struct table *t, const char *name, struc
             return err_set(e, E_MISSING, "%s: no column %s: a shapelet catalogue has ID BETA NMAX MAG and last COEFFS", name, needed[i]);
     if (t->nrow && (!m->id || !nmax))
         return err_set(e, E_DATA, "%s: column %s must hold whole numbers", name, m->id ? "NMAX" : "ID");
+    if (!unitname_is(beta->unit, "arcsec"))
+        return err_set(e, E_DATA, "%s: column BETA is in '%.40s', not in arcsec: convert it", name, beta->unit);
     if (beta->type == COL_TEXT || beta->type == COL_RAGGED || (mag && mag->type == COL_TEXT))
         return err_set(e, E_DATA, "%s: column %s must hold numbers", name, mag && mag->type == COL_TEXT ? "MAG" : "BETA");
     if (c->type != COL_RAGGED)

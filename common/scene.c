@@ -2,6 +2,7 @@
  * scene.c - a scene list checked and converted, row by row.
  */
 #include "scene.h"
+#include "unitname.h"
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
@@ -28,20 +29,24 @@ static size_t row_number(const struct reader *r)
     return r->before + r->row + 1;
 }
 
-static const struct column *numeric(struct reader *r, const struct table *t, const char *name)
+/* A column of numbers in `unit`; "" for a pure number, whose unit is not looked at. */
+static const struct column *numeric(struct reader *r, const struct table *t, const char *name, const char *unit)
 {
     const struct column *c = table_find(t, name);
-    if (c && (c->type == COL_TEXT || c->type == COL_RAGGED) && !r->st)
+    if (c && (c->type == COL_TEXT || c->type == COL_RAGGED || c->logical) && !r->st)
         r->st = err_set(r->e, E_DATA, "%s: column %s must hold numbers", r->name, name);
+    if (c && *unit && !unitname_is(c->unit, unit) && !r->st)
+        r->st = err_set(r->e, E_DATA, "%s: column %s is in '%.40s', not in %s: convert it", r->name, name, c->unit, unit);
     return c;
 }
 
 static int find_columns(struct reader *r, const struct table *t, struct columns *c, enum scene_where *where)
 {
     static const char *const place[3][2] = {{"DX", "DY"}, {"RA", "DEC"}, {"X_IMAGE", "Y_IMAGE"}};
+    static const char *const unit[3] = {"arcsec", "deg", "pixel"};
     static const enum scene_where kind[3] = {SCENE_FIELD, SCENE_SKY, SCENE_PIXEL};
     for (int i = 0; i < 3; i++) {
-        const struct column *x = numeric(r, t, place[i][0]), *y = numeric(r, t, place[i][1]);
+        const struct column *x = numeric(r, t, place[i][0], unit[i]), *y = numeric(r, t, place[i][1], unit[i]);
         if (!x || !y)
             continue;
         if (c->x && !r->st)
@@ -50,20 +55,20 @@ static int find_columns(struct reader *r, const struct table *t, struct columns 
         c->y = y;
         *where = kind[i];
     }
-    c->flux = numeric(r, t, "FLUX");
-    c->mag = numeric(r, t, "MAG");
+    c->flux = numeric(r, t, "FLUX", "electron/s");
+    c->mag = numeric(r, t, "MAG", "mag");
     c->model = table_find(t, "MODEL");
     c->id = table_find(t, "ID");
     c->type = table_find(t, "TYPE");
-    c->parity = numeric(r, t, "PARITY");
-    c->rot = numeric(r, t, "ROT");
-    c->dilation = numeric(r, t, "DILATION");
-    c->g1 = numeric(r, t, "G1");
-    c->g2 = numeric(r, t, "G2");
-    c->re = numeric(r, t, "RE");
-    c->n = numeric(r, t, "N");
-    c->q = numeric(r, t, "Q");
-    c->pa = numeric(r, t, "PA");
+    c->parity = numeric(r, t, "PARITY", "");
+    c->rot = numeric(r, t, "ROT", "deg");
+    c->dilation = numeric(r, t, "DILATION", "");
+    c->g1 = numeric(r, t, "G1", "");
+    c->g2 = numeric(r, t, "G2", "");
+    c->re = numeric(r, t, "RE", "arcsec");
+    c->n = numeric(r, t, "N", "");
+    c->q = numeric(r, t, "Q", "");
+    c->pa = numeric(r, t, "PA", "deg");
     if (r->st)
         return r->st;
     if (!c->x || !c->y)

@@ -33,6 +33,7 @@ struct column {
     } v;                   /* nrow values; ragged: v.r holds all rows end to end */
     size_t *start;         /* ragged: nrow + 1 offsets into v.r */
     size_t room;           /* ragged: values v.r has room for */
+    int logical;           /* a column of T and F in a FITS file, which stand as 1 and 0 */
 };
 
 struct keyword {

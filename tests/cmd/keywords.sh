@@ -134,3 +134,27 @@ spoilt true.fits CD1_1 -1.3e-5 >one.fits; spoilt one.fits CD2_2 5.934995e-5 >rec
 fails "depth of a point in them" 1 addnoise --depth 27 --depth-definition point5 -p p.fits rect.fits -o made; told "by a factor"
 ok "that of an area needs no squares" addnoise --depth 27 rect.fits -o made
 ok "drizzle makes squares of them" drizzle rect.fits -x 0.1 --size 120,120 -o made
+
+# units of a list's columns: another than the column's is refused, spellings of its own are not; a logical is no number
+list() { # COLUMN UNIT: a list with that unit
+    printf '# Column 1: DX [%s,f64] place along x\n# Column 2: DY [%s,f64] place along y\n# Column 3: FLUX [%s,f64] electrons per second\n# Column 4: TYPE [,str8] kind of it\n# DX DY FLUX TYPE\n0.5 0.5 100 star\n' "$1" "$1" "$2" >list.txt
+}
+I="simage list.txt -x 0.1 --size 32,32 -o made"
+for u in arcsec Arcseconds '"' ''; do list "$u" electron/s; ok "DX in '$u'" $I; done
+for u in 'electrons/s' 'e-/s' 'electron s-1'; do list arcsec "$u"; ok "FLUX in '$u'" $I; done
+rm made
+for u in arcmin pixel deg mas; do list "$u" electron/s; fails "DX in $u" 1 $I; told "DX is in '$u', not in arcsec"; done
+for u in mag adu/s electron Jy; do list arcsec "$u"; fails "FLUX in $u" 1 $I; told "FLUX is in '$u', not in electron/s"; done
+list arcsec electron/s; cutcat --only-where list.txt -o list.fits
+perl -pe "s/TUNIT1  = 'arcsec  '/TUNIT1  = 'arcmin  '/" list.fits >arcmin.fits
+fails "DX in arcmin, in FITS" 1 ${I/list.txt/arcmin.fits}; told "DX is in 'arcmin'"
+perl -e 'print map { sprintf "%-80s", $_ } "SIMPLE  =                    T", "BITPIX  =                    8", "NAXIS   =                    0", "END"; print " " x 2560;
+    my @c = ("XTENSION= \x27BINTABLE\x27", "BITPIX  =                    8", "NAXIS   =                    2", "NAXIS1  =                   21", "NAXIS2  =                    1", "PCOUNT  =                    0",
+    "GCOUNT  =                    1", "TFIELDS =                    4", "TTYPE1  = \x27DX      \x27", "TFORM1  = \x27L       \x27", "TTYPE2  = \x27DY      \x27", "TFORM2  = \x27D       \x27",
+    "TTYPE3  = \x27FLUX    \x27", "TFORM3  = \x27D       \x27", "TTYPE4  = \x27TYPE    \x27", "TFORM4  = \x274A      \x27", "END");
+    print map({ sprintf "%-80s", $_ } @c), " " x (2880 - 80 * @c); my $d = "T" . pack("d>d>", 0.5, 100) . "star"; print $d, "\0" x (2880 - length $d)' >logical.fits
+fails "DX as a logical" 1 ${I/list.txt/logical.fits}; told "DX must hold numbers"
+perl -pe "s/TFORM1  = 'L       '/TFORM1  = 'B       '/" logical.fits >bytes.fits; ok "a byte is a number" ${I/list.txt/bytes.fits}
+sed '/^#.*BETA/s/arcsec/pixel/' models.txt >pixels.txt
+if cmp -s models.txt pixels.txt; then fail "pixels.txt has still arcsec"; fi
+rm -f made; fails "BETA in pixels" 1 simage scene.txt --models pixels.txt -x 0.1 -o made; told "BETA is in 'pixel'"

@@ -60,7 +60,7 @@ static void plain_images(void)
 {
     struct header h = {0};
     struct psf_options o = {0};
-    int bad = set(&h, "PIXELSCL", 0.03) | set(&h, "PIXSCALE", 0.5);
+    int bad = set(&h, "PIXELSCL", 0.03) | set(&h, "PIXSCALE", 0.03);
     write_gaussian("a.fits", 61, 64, 3, 30, 31.5, 1, &h);
     expect_gaussian("a.fits", &o, 0.03, 3, 1);
     bad |= set(&h, "PIXSCALE", 0.02) | set(&h, "CRPIX1", 25.25) | set(&h, "CRPIX2", 41);
@@ -109,7 +109,10 @@ static void refusals(void)
     struct psf_options o = {0};
     write_gaussian("none.fits", 20, 20, 2, 10, 10, 1, &h);
     refused("none.fits", &o, E_DATA, "--psf-scale");
-    int bad = header_set_str(&h, "PIXELSCL", "small", NULL);
+    int bad = set(&h, "PIXELSCL", 0.03) | set(&h, "PIXSCALE", 0.5);
+    write_gaussian("two.fits", 20, 20, 2, 10, 10, 1, &h);
+    refused("two.fits", &o, E_DATA, "PIXELSCL 0.03 and PIXSCALE 0.5 differ");
+    bad |= header_set_str(&h, "PIXELSCL", "small", NULL);
     write_gaussian("word.fits", 20, 20, 2, 10, 10, 1, &h);
     refused("word.fits", &o, E_DATA, "PIXELSCL");
     bad |= set(&h, "PIXSCALE", 0.1);
