@@ -59,7 +59,7 @@ perl "$TOP/tests/fits.pl" make m.fits 40 30 '$x' "EXTEND  =                    T
 perl "$TOP/tests/fits.pl" add m.fits 60 20 '$x*$y' "EXTNAME = 'SCI     '" "EXTVER  = 1"
 perl "$TOP/tests/fits.pl" add m.fits 50 25 '$x+3*$y' "EXTNAME = 'SCI     '" "EXTVER  = 2"
 fpack -g2 -q 0 -O m.fz m.fits
-compare "the first image" m.fits m.fz
+compare "the first image" 'm.fits[0]' 'm.fz[1]'
 compare "by name" 'm.fits[SCI]' 'm.fz[sci]'
 compare "by name and version" 'm.fits[SCI,2]' 'm.fz[SCI,2]'
 ok "a program reads it" fits2png i16.r.fz -o p1.png; fits2png i16.fits -o p2.png; same "and sees the same" p1.png p2.png

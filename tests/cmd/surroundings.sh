@@ -97,7 +97,7 @@ for f in bad/*; do
     try rrgshape --stars $f noisy.fits cat.txt
     try psfgen --from $f
     try simage -p $f scene.txt --models models.txt -x 0.1
-    try simage $f -p psf.fits -x 0.1
+    try simage $f -p psf.fits -x 0.1 --size 100,100
     try simage scene.txt --models $f -p psf.fits -x 0.1
     try galgen --library $f -n 3
     try cutcat $f
