@@ -201,12 +201,13 @@ static void check_only_where(const struct opt *own, const struct common *c)
 }
 
 /* The catalogue's own stars and flags are cut where it tells them; asked for, they must be there. */
-static void check_asked(const struct table *t, const char *name, const struct opt *own, const struct common *c)
+static void check_asked(const struct table *t, const char *name, const struct cuts *cuts, const struct opt *own, const struct common *c)
 {
-    static const char *const need[][2] = {{"star-prob", "STAR_PROB"}, {"flags", "FLAGS_RRG"}};
+    const struct { const char *option, *column; int cuts; } need[] = {{"star-prob", "STAR_PROB", cuts->star_prob < 1},
+                                                                     {"flags", "FLAGS_RRG", cuts->flags != 0}};
     for (int i = 0; i < 2; i++)
-        if (opt_given(own, c, need[i][0]) && !table_find(t, need[i][1]))
-            die(EXIT_RUN, "%s: no column %s: --%s cannot cut", name, need[i][1], need[i][0]);
+        if (need[i].cuts && opt_given(own, c, need[i].option) && !table_find(t, need[i].column))
+            die(EXIT_RUN, "%s: no column %s: --%s cannot cut", name, need[i].column, need[i].option);
 }
 
 int main(int argc, char **argv)
@@ -247,7 +248,7 @@ int main(int argc, char **argv)
     struct expr *where = parse_where(&p.where);
     if (table_in_open(&in, &t, c.argv[0], c.max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
-    check_asked(&t, c.argv[0], own, &c);
+    check_asked(&t, c.argv[0], &cuts, own, &c);
     cuts.locus_mag = p.locus[0];
     cuts.locus_width = p.locus[1];
     if (!cuts.only_where)

@@ -29,10 +29,12 @@ struct entry {
     unsigned int index;
 };
 
-/* Rows of a stamp that are made together, as doubles or floats. */
+/* Rows of a stamp that are made together, as doubles, or as floats behind HEAD doubles, whose first is added to all of them. */
 struct piece {
     int first, rows, single;
 };
+
+enum { HEAD = 8 };                 /* a line of the cache */
 
 static int part_rows(const struct draw *d)
 {
@@ -76,7 +78,7 @@ static int draw_piece(const struct plan *p, const struct entry *e, const struct 
         return stamp_mapped(w, &shape, v->pixel, box, d->nx, q->rows, x, y - q->first, s->flux, out);
     case PATH_FOURIER:
         if (q->single)
-            return stamp_single(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, (float *)out);
+            return stamp_single(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, (float *)(out + HEAD), out);
         return stamp_fourier(&p->grid[d->grid], w, &shape, x, y, s->flux, d->kcut, out);
     case PATH_BROAD:
         return stamp_broad(&p->grid[d->grid], w, &shape, v->pixel, d->nx, q->rows, x, y - q->first, s->flux, d->kcut, out);
@@ -151,10 +153,10 @@ WIDE static void add_doubles(long n, const double *restrict from, double *restri
         to[i] += from[i];
 }
 
-WIDE static void add_singles(long n, const float *restrict from, double *restrict to)
+WIDE static void add_singles(long n, const float *restrict from, double rest, double *restrict to)
 {
     for (long i = 0; i < n; i++)
-        to[i] += (double)from[i];
+        to[i] += (double)from[i] + rest;
 }
 
 WIDE static void add_floats(long n, const double *restrict from, float *restrict to)
@@ -207,7 +209,7 @@ static void strip_add(struct window *w, int strip, const struct draw *d, const s
         if (row < 0)
             add_floats(x1 - x0, stamp + from, w->im->pix + (size_t)y * (size_t)nx + x0);
         else if (q->single)
-            add_singles(x1 - x0, (const float *)stamp + from, w->row + (size_t)(y % w->height) * (size_t)nx + x0);
+            add_singles(x1 - x0, (const float *)(stamp + HEAD) + from, stamp[0], w->row + (size_t)(y % w->height) * (size_t)nx + x0);
         else
             add_doubles(x1 - x0, stamp + from, w->row + (size_t)(y % w->height) * (size_t)nx + x0);
     }
@@ -217,7 +219,7 @@ static size_t doubles_of(const struct plan *p, const struct entry *e)
 {
     const struct piece q = piece_of(p, e);
     const size_t numbers = (size_t)q.rows * (size_t)p->draw[e->index].nx;
-    return ((q.single ? (numbers + 1) / 2 : numbers) + 7) / 8 * 8;
+    return ((q.single ? HEAD + (numbers + 1) / 2 : numbers) + 7) / 8 * 8;
 }
 
 /* Entries that are drawn together, and the strips that they reach. */

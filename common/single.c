@@ -132,3 +132,23 @@ void single_row(const struct single *q, int ky, int m, const float *f, const dou
         add_mirrored(q->n, m, line, line + next, mirror_re, mirror_im);
     }
 }
+
+/* Sixteen sums side by side, then these in order. */
+WIDE static double sum_of(size_t n, const float *p)
+{
+    d16 part = {0};
+    double sum = 0;
+    size_t k = 0;
+    for (; k + LANES <= n; k += LANES)
+        part += __builtin_convertvector(*(const v16 *)(p + k), d16);
+    for (int i = 0; i < LANES; i++)
+        sum += part[i];
+    for (; k < n; k++)
+        sum += (double)p[k];
+    return sum;
+}
+
+double single_sum(size_t n, const float *p)
+{
+    return sum_of(n, p);
+}

@@ -37,4 +37,7 @@ struct single_transfer {
 void single_row(const struct single *q, int ky, int m, const float *f, const double turn[2], const struct single_transfer *up,
                 const struct single_transfer *down);
 
+/* The sum of n numbers, in double. */
+double single_sum(size_t n, const float *p);
+
 #endif

@@ -702,8 +702,18 @@ static void take_single(const struct transform *t, struct single *q, int columns
     single_take(orders, (int)ld, from, t->vo, to, q->vo);
 }
 
+/* The frequency 0 in double, where phases are 1 and odd orders 0; re: the transfer function there. */
+static double at_zero(const struct drawing *d, double re)
+{
+    const struct transform *t = &d->t;
+    double sum = t->s->coef ? 0 : 1;
+    for (int n2 = 0; n2 <= t->nmax; n2 += 2)
+        sum += t->phi_y[(size_t)n2 * (size_t)t->ld] * t->ve[(size_t)n2 * (size_t)t->ld];
+    return sum * re * d->scale;
+}
+
 int stamp_single(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux, double kcut,
-                 float *out)
+                 float *out, double *rest)
 {
     if (!drawable(s, x, y, flux, kcut) || g->parts != 1 || s->mapped || g->columns)
         return E_RANGE;
@@ -713,6 +723,8 @@ int stamp_single(const struct stamp_grid *g, struct stamp_work *w, const struct 
         return st;
     const struct drawing *d = &w->d;
     const struct transform *t = &d->t;
+    const size_t pixels = (size_t)g->n * (size_t)g->n;
+    double mean = 0;                       /* of the pixels, the frequency 0: what rounding took of it first */
     struct single q;
     take_single(t, &q, top + 1, (float *)w->freq);
     for (int ky = 0; ky <= top; ky++) {
@@ -725,8 +737,12 @@ int stamp_single(const struct stamp_grid *g, struct stamp_work *w, const struct 
         for (int n2 = 0; n2 <= t->nmax; n2++)
             f[n2] = (float)t->phi_y[(size_t)n2 * (size_t)t->ld + (size_t)ky];
         single_row(&q, ky, m, f, turn, &up, &down);
+        if (ky == 0)
+            mean = at_zero(d, up.re[0]) - (double)q.line[0];
     }
+    mean += (double)q.re[0];
     lanes_run_single(g->fft, d->f.columns, q.re, q.im, q.width, (float *)w->lines.fft, out);
+    *rest = mean - single_sum(pixels, out) / (double)pixels;
     return OK;
 }
 

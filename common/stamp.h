@@ -99,10 +99,10 @@ MUST_CHECK int stamp_fourier(const struct stamp_grid *g, struct stamp_work *w, c
 
 /*
  * The same in single precision, for grids of one part with a table and shapes that are not mapped: 3e-7 of the peak, and
- * |flux| such that float holds its squares.
+ * |flux| such that float holds its squares.  rest: what each pixel lacks for the sum to be that of double precision.
  */
 MUST_CHECK int stamp_single(const struct stamp_grid *g, struct stamp_work *w, const struct shape *s, double x, double y, double flux,
-                            double kcut, float *out);
+                            double kcut, float *out, double *rest);
 
 /*
  * One part of it: rows part, part + parts, ... of the stamp, stamp_stride(n) doubles from one to the next, in

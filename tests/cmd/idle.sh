@@ -62,7 +62,7 @@ ok "rrgshape: labels of a catalogue that was cut" rrgshape noisy.fits some.cat -
 fails "rrgshape: labels of another catalogue" 1 rrgshape noisy.fits seg.cat --stars stars.rrg --segmentation less.fits -o made
 grep -q "lie on labels of others" cmd.err && pass "told" || fail "rrgshape: $(cat cmd.err)"
 cutcat --only-where --columns NUMBER,E1,E2,D_RRG,FLUX_AUTO,FLUXERR_AUTO shapes.txt -o bare.txt
-ok "cutcat: no classes, none asked for" cutcat bare.txt --stars stars.rrg -o bare.use
+ok "cutcat: no classes, none asked for" cutcat bare.txt --stars stars.rrg --star-prob 1 --flags 0 -o bare.use
 fails "cutcat: --star-prob without STAR_PROB" 1 cutcat bare.txt --stars stars.rrg --star-prob 0.5 -o made
 fails "cutcat: --flags without FLAGS_RRG" 1 cutcat bare.txt --stars stars.rrg --flags 3 -o made
 ln -s cut.txt link.txt

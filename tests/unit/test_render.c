@@ -82,7 +82,7 @@ static void extremes(const struct otf *t)
         const int n = order[i / 2 % 3];
         const double b = beta[i / 6 % 4], g[2] = {0.4 * shear[i / 24], 0.9 * shear[i / 24]}, strength = hypot(g[0], g[1]);
         const double reach = b * sqrt((1 + strength) / (1 - strength)) * (sqrt(2.0 * n + 2) + 5);
-        const int held = reach < 107, side = held ? 2 * (int)fmax(50, 10 * reach + 2) : 60;
+        const int held = reach < 107, side = held ? 2 * (int)fmax(i % 2 ? 100 : 50, 10 * reach + 2) : 60;
         double c[2000] = {0}, m[6];
         if (!held && i % 2)
             continue;
@@ -93,7 +93,7 @@ static void extremes(const struct otf *t)
         const struct view v = {.nx = side, .ny = side, .pixel = 0.1, .psf = i % 2 ? t : NULL, .g1 = g[0], .g2 = g[1]};
         struct image im = render(&v, i % 2 ? 1e-4 : 1e-9, 1, &s, 1, NULL);
         const double sum = sum_of(&im) / 1000, want = held ? m[0] : inside(b, n / 2, 0.3, g, side, 0.1);
-        check_close(&k, sum / want, 1, i % 2 ? 3e-7 : 6e-8);   /* at 1e-4 stamps are made in single precision */
+        check_close(&k, sum / want, 1, 6e-8);
         whole += held;
         part += !held;
         image_free(&im);

@@ -460,6 +460,8 @@ static void single(void)
     static double want[MOST * MOST];
     static float got[MOST * MOST];
     struct check c = check_begin("single precision: sides 12 to 200, orders 0 to 60 and a point, all or some frequencies: of the peak");
+    struct check whole = check_begin("single precision: the sum of the pixels, over the sum of their sizes");
+    double rest;
     struct stamp_work *w = NULL;
     int refused = 0;
     if (!check_that(stamp_work_new(&w) == OK, "work"))
@@ -480,15 +482,20 @@ static void single(void)
                     struct shape s = {.nmax = orders[o] < 0 ? 0 : orders[o], .beta_x = beta * 1.1, .beta_y = beta / 1.1};
                     double *coef = orders[o] < 0 ? NULL : galaxy(s.nmax, beta);
                     s.coef = coef;
-                    if (stamp_fourier(&g, w, &s, 0.43 * n + 0.2, 0.52 * n - 0.3, 1e4, kcut, want) || stamp_single(&g, w, &s, 0.43 * n + 0.2, 0.52 * n - 0.3, 1e4, kcut, got))
+                    if (stamp_fourier(&g, w, &s, 0.43 * n + 0.2, 0.52 * n - 0.3, 1e4, kcut, want) || stamp_single(&g, w, &s, 0.43 * n + 0.2, 0.52 * n - 0.3, 1e4, kcut, got, &rest))
                         exit(1);
                     const double peak = peak_of(pixels, want);
-                    for (size_t k = 0; k < pixels; k++)
-                        check_close(&c, (double)got[k] / peak, want[k] / peak, 3e-7);
+                    double sum = 0, size = 0;
+                    for (size_t k = 0; k < pixels; k++) {
+                        check_close(&c, ((double)got[k] + rest) / peak, want[k] / peak, 3e-7);
+                        sum += (double)got[k] + rest - want[k];
+                        size += fabs(want[k]);
+                    }
+                    check_close(&whole, sum / size, 0, 1e-12);
                     s.mapped = 1;
-                    refused += stamp_single(&g, w, &s, 1, 1, 1, 9, got) == E_RANGE;
+                    refused += stamp_single(&g, w, &s, 1, 1, 1, 9, got, &rest) == E_RANGE;
                     s.mapped = 0;
-                    refused += stamp_single(&cut, w, &s, 1, 1, 1, 9, got) == E_RANGE;
+                    refused += stamp_single(&cut, w, &s, 1, 1, 1, 9, got, &rest) == E_RANGE;
                     free(coef);
                 }
             stamp_grid_free(&g);
@@ -497,6 +504,7 @@ static void single(void)
         }
     stamp_work_free(w);
     check_end(&c);
+    check_end(&whole);
     check_that(refused == 2 * 2 * 17 * 7 * 3, "single precision: mapped shapes and grids of parts are refused (%d)", refused);
 }
 
