@@ -134,13 +134,13 @@ void single_row(const struct single *q, int ky, int m, const float *f, const dou
 }
 
 /* Sixteen sums side by side, then these in order. */
-WIDE static double sum_of(size_t n, const float *p)
+WIDE static double sum_of(size_t n, const float *restrict p)
 {
-    d16 part = {0};
-    double sum = 0;
+    double part[LANES] = {0}, sum = 0;
     size_t k = 0;
     for (; k + LANES <= n; k += LANES)
-        part += __builtin_convertvector(*(const v16 *)(p + k), d16);
+        for (int i = 0; i < LANES; i++)
+            part[i] += (double)p[k + (size_t)i];
     for (int i = 0; i < LANES; i++)
         sum += part[i];
     for (; k < n; k++)

@@ -74,11 +74,14 @@ once() { # COMMAND...: exit 2 before anything is read
     if grep -q "can be read once only" cmd.err && [ ! -e made ]; then pass "told"; else fail "$*: $(cat cmd.err)"; fi
 }
 once detect - --weight - <noisy.fits
+# shellcheck disable=SC2094
 once detect noisy.fits --weight - --mask - <noisy.fits
 once simage --models - -x 0.1 scene.txt -p - <models.txt
 once simage --models - -x 0.1 <scene.txt
+# shellcheck disable=SC2094
 once drizzle dith.fits --weight - --mask - <dith.fits
 once rrgshape noisy.fits - --stars stars.fits,- <cat.txt
+# shellcheck disable=SC2094
 once rrgshape noisy.fits cat.txt --stars -,- <cat.txt
 perl "$TOP/tests/fits.pl" make mask.fits 120 120 0
 ok "once, by an option" detect noisy.fits --mask - -o masked.cat <mask.fits
