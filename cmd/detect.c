@@ -80,14 +80,18 @@ static enum check_type check_of(const char *text, const char **file)
         "objects, subtracted or apertures", text);
 }
 
-/* Read a second image of the same size. */
+/* Read a second image of the same size and place on the sky. */
 static void read_beside(struct image *out, const char *name, const struct image *im, double max_memory)
 {
     struct err e;
+    double apart;
     if (image_read(out, name, max_memory, &e))
         die(EXIT_RUN, "%s", e.text);
     if (out->nx != im->nx || out->ny != im->ny)
         die(EXIT_RUN, "%s: %ld x %ld pixels, the image has %ld x %ld", name, out->nx, out->ny, im->nx, im->ny);
+    run(sky_apart(&im->hdr, &out->hdr, im->nx, im->ny, &apart), name);
+    if (apart > 0.5)
+        die(EXIT_RUN, "%s: its WCS places the same pixels %.3g pixels away from those of the image: give one of the same field", name, apart);
 }
 
 /* A weight map as rms per pixel, NULL without a name. */
@@ -455,12 +459,53 @@ static void write_count(const struct common *c, const struct detection *d, const
         die(EXIT_RUN, "%s", e.text);
 }
 
+static int has_pixel(const struct pixels *p, float *row)
+{
+    for (long y = 0; y < p->ny; y++) {
+        pixels_row(p, y, 0, p->nx, row);
+        for (long x = 0; x < p->nx; x++)
+            if (isfinite(row[x]))
+                return 1;
+    }
+    return 0;
+}
+
+static int has_weight(size_t n, const float *map)
+{
+    size_t k = 0;
+    while (k < n && !(map[k] > 0 && map[k] < INFINITY))
+        k++;
+    return k < n;
+}
+
+/* The input that has no pixel for us; NULL: each has some, but not the same. */
+static const char *without_pixels(const struct frame *f, const char *in, const struct options *o)
+{
+    const size_t n = (size_t)f->im.nx * (size_t)f->im.ny;
+    float *row = malloc((size_t)f->im.nx * sizeof *row);
+    const char *name = NULL;
+    if (!row)
+        return NULL;
+    if (!has_pixel(&f->pixels, row))
+        name = o->mask ? o->mask : in;
+    else if (f->map && !has_weight(n, f->map))
+        name = o->weight;
+    else if (o->measure && !has_pixel(&f->other_pixels, row))
+        name = o->measure;
+    else if (f->other_map && !has_weight(n, f->other_map))
+        name = o->measure_weight;
+    free(row);
+    return name;
+}
+
 static void detect_or_die(const struct frame *f, const char *in, const struct options *o,
                           const struct detect_params *p, struct detection *d)
 {
     int st = detect_run(&f->pixels, f->map, o->weight_type != WEIGHT_RMS, p, d);
+    const char *empty = st == E_DATA ? without_pixels(f, in, o) : NULL;
     if (st == E_DATA)
-        die(EXIT_RUN, "%s: no usable pixel: all are blank, masked or without weight", in);
+        die(EXIT_RUN, "%s: no usable pixel: %s", empty ? empty : in, empty ? "all are blank, masked or without weight"
+                                                                           : "those that are not blank are masked or without weight");
     if (st == E_SINGULAR)
         die(EXIT_RUN, "%s: the background has no noise (constant image): give --rms", in);
     run(st, in);

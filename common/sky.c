@@ -466,3 +466,21 @@ int sky_set_tan(struct header *h, double scale, double crpix1, double crpix2, do
     *h = new;
     return OK;
 }
+
+int sky_apart(const struct header *a, const struct header *b, long nx, long ny, double *pixels)
+{
+    struct sky *ours = NULL, *theirs = NULL;
+    struct err e;
+    double x[2] = {0, (double)nx - 1}, y[2] = {0, (double)ny - 1}, ra[2], dec[2], far = NAN;
+    int st = sky_open(&ours, a, &e), other = st == OK ? sky_open(&theirs, b, &e) : OK;
+    if (st == OK && other == OK && sky_from_pixel(theirs, 2, x, y, ra, dec) == OK) {
+        int seen = sky_to_pixel(ours, 2, ra, dec, ra, dec);      /* E_RANGE: on the other side of the sky */
+        far = seen == OK ? fmax(hypot(ra[0] - x[0], dec[0] - y[0]), hypot(ra[1] - x[1], dec[1] - y[1])) : INFINITY;
+    }
+    sky_close(ours);
+    sky_close(theirs);
+    if (st == E_NOMEM || other == E_NOMEM)
+        return E_NOMEM;
+    *pixels = far;
+    return OK;
+}

@@ -47,6 +47,12 @@ void sky_reference(const struct sky *s, double *ra, double *dec);
 MUST_CHECK int sky_pixels(const struct header *h, double *scale, double *ratio, struct err *e);
 
 /*
+ * How far apart, in pixels of `a`, two headers place the first and the last of nx x ny pixels: the
+ * greater of both; NaN when one of them has no positions on the sky.  E_NOMEM.
+ */
+MUST_CHECK int sky_apart(const struct header *a, const struct header *b, long nx, long ny, double *pixels);
+
+/*
  * Write the standard TAN of this project into h: RA---TAN, DEC--TAN, ICRS,
  * CD1_1 = -scale/3600, CD2_2 = scale/3600, CRPIX (FITS, from 1), CRVAL (deg).
  */

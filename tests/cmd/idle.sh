@@ -68,6 +68,23 @@ fails "cutcat: --flags without FLAGS_RRG" 1 cutcat bare.txt --stars stars.rrg --
 ln -s cut.txt link.txt
 fails "fom: a catalogue twice" 2 fom cut.txt cut.txt
 fails "fom: by another name" 2 fom cut.txt shapes.txt link.txt
+# maps of another place on the sky, and maps without a pixel: each is named
+perl -e 'local $/; $_ = <STDIN>; for (my $i = 0; $i < 11520; $i += 80) { if (substr($_, $i, 8) eq "CRVAL1  ") { substr($_, $i, 80) = sprintf("%-80s", "CRVAL1  =                 10.0") } } print' <noisy.fits >afar.fits
+perl -e 'local $/; $_ = <STDIN>; for (my $i = 0; $i < 11520; $i += 80) { if (substr($_, $i, 8) =~ /^CRPIX1/) { my $v = substr($_, $i + 10, 20) + .3; substr($_, $i, 80) = sprintf("%-80s", sprintf("CRPIX1  = %20.10f", $v)) } } print' <noisy.fits >near.fits
+for o in measure weight mask; do
+    fails "detect: --$o of another field" 1 detect noisy.fits --$o afar.fits -o made
+    grep -q "^detect: afar.fits: its WCS places" cmd.err && pass "told" || fail "--$o: $(cat cmd.err)"
+done
+ok "detect: measured .3 pixels away" detect noisy.fits --measure near.fits -o near.cat
+side=$(card noisy.fits NAXIS1)
+perl "$TOP/tests/fits.pl" make zero.fits "$side" "$side" 0
+perl "$TOP/tests/fits.pl" make one.fits "$side" "$side" 1
+for o in "weight zero" "measure-weight zero" "mask one"; do
+    # shellcheck disable=SC2086
+    set -- $o
+    fails "detect: --$1 without a pixel" 1 detect noisy.fits --measure noisy.fits --$1 $2.fits -o made
+    grep -q "^detect: $2.fits: no usable pixel" cmd.err && pass "$2.fits is named" || fail "--$1: $(cat cmd.err)"
+done
 # standard input, asked for twice: by an operand and an option, by two options, in a pair
 once() { # COMMAND...: exit 2 before anything is read
     fails "$* <file" 2 "$@" -o made
