@@ -7,7 +7,7 @@
  * The reference has four times the period of the object's largest stamp, always, all frequencies, in double, and a shear that
  * is evaluated, not expanded; without a PSF nothing comes back, and it is the middle 2560 pixels of the object itself.
  * The promise (accuracy.h): 99 % within the request, none beyond 3 times.  Alone, each request takes every step-th object
- * (25 to 190); REQUESTS=all takes all 398 (tests/large/requests_*.sh: 1e-2 to 1e-7 at each of .04", .10" and .16").
+ * (9 to 131); REQUESTS=all takes all 398 (tests/large/requests_*.sh: 1e-2 to 1e-7 at each of .04", .10" and .16").
  * Objects larger than any stamp are in test_broad.c.
  */
 #include "emit.h"
