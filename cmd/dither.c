@@ -355,7 +355,7 @@ int main(int argc, char **argv)
     w.share = w.x.unit == UNIT_RATE ? 1 : 1.0 / w.count;
     if (c.verbose || c.check)
         fprintf(stderr, "dither: %s: %ld x %ld -> %d exposures of %ld x %ld pixels, about %.2g s\n", w.name, w.x.nx, w.x.ny,
-                w.count, w.side[0], w.side[1], 2e-9 * w.count * (double)w.x.nx * (double)w.x.ny);
+                w.count, w.side[0], w.side[1], 1.2e-9 * w.count * (double)w.x.nx * (double)w.x.ny);
     char *record = opt_record(&prog, own, &c);
     w.record = record;
     if (!c.check && write_all(&w, &e))

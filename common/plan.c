@@ -481,7 +481,7 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     if (d->grown)                          /* turned, squeezed and turned back */
         matrix += 0.55e-9 * orders * orders * orders;
     if (d->path == PATH_CLOSED)
-        return 1e-6 + matrix + 0.17e-9 * orders * area + 7e-9 * orders * (d->nx + d->ny);
+        return 0.8e-6 + matrix + 0.14e-9 * orders * area + 5.6e-9 * orders * (d->nx + d->ny);
     if (d->path == PATH_MAPPED) {
         struct pose q;
         if (s->nmax == 0)
@@ -501,7 +501,7 @@ static double cost_of(const struct plan *p, const struct emitter *s, const struc
     if (area > 6e5)                        /* beyond the caches */
         pixel *= 1.8;
     if (plan_single(p, (size_t)(d - p->draw)))
-        return 1.5e-6 + matrix + 0.5 * rows + 1e-9 * orders * orders * k / 8 + 0.65 * area * pixel;
+        return 1e-6 + matrix + 0.3 * rows + 0.8e-9 * orders * orders * k / 8 + 0.4 * area * pixel;
     return 1.5e-6 + matrix + rows * g->parts + 1e-9 * orders * orders * k / 8 + area * pixel;
 }
 
