@@ -76,6 +76,8 @@ for o in measure weight mask; do
     grep -q "^detect: afar.fits: its WCS places" cmd.err && pass "told" || fail "--$o: $(cat cmd.err)"
 done
 ok "detect: measured .3 pixels away" detect noisy.fits --measure near.fits -o near.cat
+perl -e 'local $/; $_ = <STDIN>; for (my $i = 0; $i < 11520; $i += 80) { if (substr($_, $i, 8) =~ /^CRPIX1/) { my $v = substr($_, $i + 10, 20) + .4; substr($_, $i, 80) = sprintf("%-80s", sprintf("CRPIX1  = %20.10f", $v)) } } print' <near.fits >next.fits
+fails "detect: measured .7 pixels away" 1 detect noisy.fits --measure next.fits -o made
 side=$(card noisy.fits NAXIS1)
 perl "$TOP/tests/fits.pl" make zero.fits "$side" "$side" 0
 perl "$TOP/tests/fits.pl" make one.fits "$side" "$side" 1
